@@ -1,0 +1,60 @@
+//! What all binaries share: exit codes, how an error looks, progress on stderr.
+
+use std::{borrow::Cow, process::ExitCode, time::Duration};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::error::Result;
+
+/// How a run ended when it did not fail. Failure is `Err`, exit 1; clap exits 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for was done. Exit 0.
+    Done,
+    /// Done, but something was left out, and the report says what. Exit 3.
+    DoneWithLoss,
+}
+
+/// Run a binary's body, print what went wrong once, and pick the exit code.
+pub fn main(body: impl FnOnce() -> Result<Outcome>) -> ExitCode {
+    match body() {
+        Ok(Outcome::Done) => ExitCode::from(0),
+        Ok(Outcome::DoneWithLoss) => ExitCode::from(3),
+        Err(error) => {
+            eprintln!("error: {error}");
+            if let Some(hint) = error.hint() {
+                eprintln!("\nhint: {hint}");
+            }
+            ExitCode::from(1)
+        }
+    }
+}
+
+/// A progress bar on stderr with rate and time left; draws nothing where stderr is no terminal.
+///
+/// `unit` is the plural of what is counted: "frames", "steps".
+pub fn progress(total: u64, unit: &'static str, what: impl Into<Cow<'static, str>>) -> ProgressBar {
+    let template = format!(
+        "{{prefix}} {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{per_sec}}, {{eta}} left {{msg}}"
+    );
+    let style =
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(total).with_style(style).with_prefix(what);
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
+}
+
+/// Print to stdout, treating a closed pipe (`pmp-stats D | head`) as success.
+///
+/// # Errors
+///
+/// [`Error::Io`](crate::error::Error::Io) if stdout cannot be written for another reason.
+pub fn print(text: &str) -> Result<()> {
+    use std::io::Write as _;
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(crate::error::Error::io("write", "standard output")(error))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,3 @@
+//! Logs in, batches out.
+
+pub mod batch;

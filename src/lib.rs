@@ -1,0 +1,20 @@
+//! Driving logs in, policies that drive out, with numbers that can be trusted.
+//!
+//! ```text
+//! drive.mcap --+
+//!              +- log -> samples -> FRAMES -> episodes -> shards -> batches -> net --+
+//!   record ----+                      ^                                              |
+//!     ^                               | sensors             baselines, expert -------+- POLICY -+- offline ----+
+//!     |                               |                     a recorded human --------+          |              +- tables
+//!     +------------- simulator -------+                                                         +- closed loop +
+//! ```
+//!
+//! Modules are declared in the order of the flow, and a file uses only what is declared above it
+//! (`tests/it/architecture.rs` checks that).
+
+pub mod error;
+pub mod projection;
+pub mod frame;
+pub mod policy;
+pub mod dataset;
+pub mod cli;
