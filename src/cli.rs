@@ -4,7 +4,7 @@ use std::{borrow::Cow, process::ExitCode, time::Duration};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// How a run ended when it did not fail. Failure is `Err`, exit 1; clap exits 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +44,20 @@ pub fn progress(total: u64, unit: &'static str, what: impl Into<Cow<'static, str
     bar
 }
 
+/// The threads of a job: `jobs`, or one a core.
+///
+/// # Errors
+///
+/// [`Error::Config`] if `jobs` is 0 or the system gives no threads.
+pub fn thread_pool(jobs: Option<usize>) -> Result<rayon::ThreadPool> {
+    let fail = |what: String| Error::Config { key: "--jobs".into(), what, hint: None };
+    if jobs == Some(0) {
+        return Err(fail("at least 1 is needed".to_string()));
+    }
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0));
+    builder.build().map_err(|error| fail(error.to_string()))
+}
+
 /// Print to stdout, treating a closed pipe (`pmp-stats D | head`) as success.
 ///
 /// # Errors
@@ -53,7 +67,7 @@ pub fn print(text: &str) -> Result<()> {
     use std::io::Write as _;
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(crate::error::Error::io("write", "standard output")(error))
+            Err(Error::io("write", "standard output")(error))
         }
         _ => Ok(()),
     }

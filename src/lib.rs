@@ -14,7 +14,9 @@
 
 pub mod error;
 pub mod projection;
+pub mod drops;
 pub mod frame;
+pub mod log;
 pub mod policy;
 pub mod dataset;
 pub mod cli;

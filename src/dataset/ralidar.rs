@@ -1,0 +1,123 @@
+//! Lidar and radar onto the picture: the nearest return of each pixel (paper §III.C2).
+
+use glam::DVec3;
+use half::f16;
+
+use crate::{
+    error::Result,
+    frame::{LidarPixels, RadarPixels},
+    log::{
+        cloud::Cloud,
+        mapping::RADIAL_SPEED_FIELDS,
+        signals::{self, Kind, Pose, RadarReturn},
+        value::Struct,
+    },
+    projection::Camera,
+};
+
+/// Lidar returns of a cloud on the picture.
+///
+/// `camera` is that of the stored picture; `camera_from_sensor` leads into its optical frame.
+///
+/// # Errors
+///
+/// [`Error::Decode`](crate::error::Error::Decode) if the message is no readable cloud.
+pub fn lidar_pixels(
+    message: &Struct,
+    camera_from_sensor: &Pose,
+    camera: &Camera,
+) -> Result<LidarPixels> {
+    let cloud = Cloud::new(message)?;
+    let [x, y, z] = cloud.xyz()?;
+    let mut nearest = Nearest::new(camera);
+    for point in cloud.points() {
+        let sensor_m = DVec3::new(point.get(x), point.get(y), point.get(z));
+        let camera_m = camera_from_sensor.transform_point(sensor_m);
+        nearest.add(camera_m, camera_m);
+    }
+    let mut pixels = LidarPixels::default();
+    for (pixel, point_m) in nearest.finish() {
+        pixels.pixel.push(pixel);
+        pixels.x.push(f16::from_f64(point_m.x));
+        pixels.y.push(f16::from_f64(point_m.y));
+        pixels.z.push(f16::from_f64(point_m.z));
+    }
+    Ok(pixels)
+}
+
+/// Radar returns of a scan, a list of tracks or a cloud on the picture.
+///
+/// # Errors
+///
+/// As [`lidar_pixels`]; also if a cloud has no radial speed.
+pub fn radar_pixels(
+    kind: Kind,
+    message: &Struct,
+    camera_from_sensor: &Pose,
+    camera: &Camera,
+) -> Result<RadarPixels> {
+    let returns = match kind {
+        Kind::RadarScan => signals::radar_scan(message)?,
+        Kind::RadarTracks => signals::radar_tracks(message)?,
+        _ => radar_cloud(message)?,
+    };
+    let mut nearest = Nearest::new(camera);
+    for r in returns {
+        nearest.add(camera_from_sensor.transform_point(r.position_m), r.radial_speed_mps);
+    }
+    let mut pixels = RadarPixels::default();
+    for (pixel, speed_mps) in nearest.finish() {
+        pixels.pixel.push(pixel);
+        pixels.speed_mps.push(f16::from_f64(speed_mps));
+    }
+    Ok(pixels)
+}
+
+fn radar_cloud(message: &Struct) -> Result<Vec<RadarReturn>> {
+    let cloud = Cloud::new(message)?;
+    let [x, y, z] = cloud.xyz()?;
+    let speed = RADIAL_SPEED_FIELDS.iter().find_map(|name| cloud.field(name));
+    let Some(speed) = speed else {
+        return Err(crate::error::Error::Decode {
+            schema: message.name.to_string(),
+            offset: 0,
+            what: format!("no radial speed: none of {}", RADIAL_SPEED_FIELDS.join(", ")),
+        });
+    };
+    Ok(cloud
+        .points()
+        .map(|point| RadarReturn {
+            position_m: DVec3::new(point.get(x), point.get(y), point.get(z)),
+            radial_speed_mps: point.get(speed),
+        })
+        .collect())
+}
+
+/// The nearest return of each pixel.
+struct Nearest<'c, T> {
+    camera: &'c Camera,
+    /// Pixel, squared distance, order of arrival, what the return says.
+    returns: Vec<(u32, f64, u32, T)>,
+}
+
+impl<'c, T: Copy> Nearest<'c, T> {
+    fn new(camera: &'c Camera) -> Self {
+        Nearest { camera, returns: Vec::new() }
+    }
+
+    /// A return at a point of the optical frame; NaNs fall off the picture.
+    fn add(&mut self, point_m: DVec3, says: T) {
+        if let Some(pixel) = self.camera.pixel(point_m.to_array()) {
+            let order = self.returns.len() as u32;
+            self.returns.push((pixel, point_m.length_squared(), order, says));
+        }
+    }
+
+    /// Ascending by pixel; of two equally near returns the first of the message.
+    fn finish(mut self) -> impl Iterator<Item = (u32, T)> {
+        self.returns
+            .sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        self.returns.dedup_by_key(|r| r.0);
+        self.returns.into_iter().map(|(pixel, _, _, says)| (pixel, says))
+    }
+}

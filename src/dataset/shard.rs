@@ -1,0 +1,177 @@
+//! Shards: frames as Parquet files, written whole or not at all.
+//!
+//! 64 rows a row group (about 4.7 MB with lidar), so that shuffled reading by group touches
+//! little; pictures stored as they are, since JPEG does not compress again; lidar and radar as
+//! delta-coded pixels and byte-split half floats under zstd, a fifth of their plain size.
+
+use std::{fs::File, path::Path};
+
+use parquet::{
+    arrow::{
+        ArrowWriter, ProjectionMask,
+        arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReaderBuilder},
+    },
+    basic::{Compression, Encoding, ZstdLevel},
+    file::properties::{EnabledStatistics, WriterProperties},
+    schema::types::ColumnPath,
+};
+
+use crate::{
+    dataset::{
+        atomic::{AtomicFile, Committed},
+        columns::{self, SCHEMA_VERSION, VERSION_KEY},
+    },
+    error::{Error, Result},
+    frame::Frame,
+};
+
+/// Frames in a row group.
+pub const ROWS_PER_GROUP: usize = 64;
+
+/// Frames in a shard: about 150 MB with lidar.
+pub const ROWS_PER_SHARD: usize = 2048;
+
+/// A shard being written.
+pub struct ShardWriter {
+    path: std::path::PathBuf,
+    writer: ArrowWriter<AtomicFile>,
+    rows: usize,
+}
+
+impl ShardWriter {
+    /// Begin a shard.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the file cannot be made.
+    pub fn create(path: &Path) -> Result<ShardWriter> {
+        let file = AtomicFile::create(path)?;
+        let writer = ArrowWriter::try_new(file, columns::schema(), Some(properties()))
+            .map_err(Error::parquet(path))?;
+        Ok(ShardWriter { path: path.to_path_buf(), writer, rows: 0 })
+    }
+
+    /// Append frames as row groups of their own.
+    ///
+    /// # Errors
+    ///
+    /// If the disk refuses.
+    pub fn write(&mut self, episode: &str, frames: &[Frame]) -> Result<()> {
+        let batch = columns::to_columns(episode, frames).map_err(Error::arrow(&self.path))?;
+        self.writer.write(&batch).map_err(Error::parquet(&self.path))?;
+        self.writer.flush().map_err(Error::parquet(&self.path))?;
+        self.rows += frames.len();
+        Ok(())
+    }
+
+    /// Frames so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Write the footer and give the shard its name.
+    ///
+    /// # Errors
+    ///
+    /// If the disk refuses.
+    pub fn finish(self) -> Result<Committed> {
+        let file = self.writer.into_inner().map_err(Error::parquet(&self.path))?;
+        file.commit()
+    }
+}
+
+fn properties() -> WriterProperties {
+    let zstd = Compression::ZSTD(ZstdLevel::try_new(3).unwrap_or_default());
+    let item = |column: &str| {
+        ColumnPath::new(vec![column.to_string(), "list".to_string(), "element".to_string()])
+    };
+    let mut properties = WriterProperties::builder()
+        // Fixed, so that the same frames give the same bytes.
+        .set_created_by(concat!("pmp ", env!("CARGO_PKG_VERSION")).to_string())
+        .set_compression(zstd)
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::None)
+        .set_max_row_group_row_count(Some(ROWS_PER_GROUP))
+        .set_column_compression(ColumnPath::from("image"), Compression::UNCOMPRESSED);
+    for column in ["frame", "stamp"] {
+        let path = ColumnPath::from(column);
+        properties = properties.set_column_statistics_enabled(path, EnabledStatistics::Chunk);
+    }
+    for column in
+        ["episode", "route_source", "command", "town", "weather", "illumination", "traffic"]
+    {
+        properties = properties.set_column_dictionary_enabled(ColumnPath::from(column), true);
+    }
+    for column in ["lidar_pixel", "radar_pixel"] {
+        properties = properties.set_column_encoding(item(column), Encoding::DELTA_BINARY_PACKED);
+    }
+    for column in ["lidar_x", "lidar_y", "lidar_z", "radar_speed"] {
+        properties = properties.set_column_encoding(item(column), Encoding::BYTE_STREAM_SPLIT);
+    }
+    properties.build()
+}
+
+/// A shard to read from.
+#[derive(Debug)]
+pub struct ShardReader {
+    path: std::path::PathBuf,
+    metadata: ArrowReaderMetadata,
+}
+
+impl ShardReader {
+    /// Open a shard and read its footer.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Dataset`] if it was written under another version of the schema;
+    /// [`Error::Parquet`] if it is damaged.
+    pub fn open(path: &Path) -> Result<ShardReader> {
+        let file = File::open(path).map_err(Error::io("open", path))?;
+        let metadata =
+            ArrowReaderMetadata::load(&file, Default::default()).map_err(Error::parquet(path))?;
+        let found = metadata.schema().metadata().get(VERSION_KEY).cloned();
+        if found.as_deref() != Some(SCHEMA_VERSION.to_string().as_str()) {
+            let found = found.unwrap_or_else(|| "none".to_string());
+            return Err(Error::Dataset {
+                path: path.to_path_buf(),
+                what: format!("frame schema version {found}, this build reads {SCHEMA_VERSION}"),
+                hint: Some("ingest the logs again: the manifest names them".to_string()),
+            });
+        }
+        Ok(ShardReader { path: path.to_path_buf(), metadata })
+    }
+
+    /// Rows of each row group.
+    pub fn group_rows(&self) -> Vec<usize> {
+        let groups = self.metadata.metadata().row_groups();
+        groups.iter().map(|group| group.num_rows() as usize).collect()
+    }
+
+    /// The frames of a row group, each with its episode.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parquet`] or [`Error::Dataset`] if the shard is damaged.
+    pub fn frames(&self, group: usize) -> Result<Vec<(String, Frame)>> {
+        // Opened anew each time: clones of one file share their position, which threads must not.
+        let file = File::open(&self.path).map_err(Error::io("open", &self.path))?;
+        let reader =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone())
+                .with_projection(ProjectionMask::all())
+                .with_row_groups(vec![group])
+                .with_batch_size(ROWS_PER_GROUP)
+                .build()
+                .map_err(Error::parquet(&self.path))?;
+        let mut frames = Vec::new();
+        for batch in reader {
+            let batch = batch.map_err(Error::arrow(&self.path))?;
+            let some = columns::to_frames(&batch).map_err(|what| Error::Dataset {
+                path: self.path.clone(),
+                what,
+                hint: None,
+            })?;
+            frames.extend(some);
+        }
+        Ok(frames)
+    }
+}

@@ -1,0 +1,84 @@
+//! What an ingest did, as text for people.
+
+use std::fmt::{self, Display, Write as _};
+
+use crate::dataset::manifest::{LogRecord, Manifest};
+
+/// Damages of one log that are listed; the manifest has them all.
+const LISTED: usize = 5;
+
+impl Manifest {
+    /// What was made and what was left out, a few lines a log.
+    pub fn report(&self) -> impl Display + '_ {
+        Report(self)
+    }
+}
+
+struct Report<'m>(&'m Manifest);
+
+impl Display for Report<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for log in &self.0.logs {
+            write_log(f, log)?;
+        }
+        for log in &self.0.failed {
+            writeln!(f, "{}: failed: {}", log.source_log, log.error)?;
+        }
+        let hours = self.0.frames as f64 / self.0.config.rate_hz / 3600.0;
+        let plural = |count: usize, word: &str| match count {
+            1 => format!("1 {word}"),
+            count => format!("{count} {word}s"),
+        };
+        write!(
+            f,
+            "{}, {} frames, {hours:.2} h",
+            plural(self.0.logs.len(), "episode"),
+            self.0.frames
+        )?;
+        match self.0.failed.len() {
+            0 => writeln!(f),
+            count => writeln!(f, "; {} gave nothing", plural(count, "log")),
+        }
+    }
+}
+
+fn write_log(f: &mut fmt::Formatter, log: &LogRecord) -> fmt::Result {
+    writeln!(
+        f,
+        "{}: {} frames ({} with 3 s of future), {:.1} s, {:.0} m, {}",
+        log.source_log,
+        log.frames,
+        log.frames_with_full_future,
+        log.duration_s,
+        log.distance_m,
+        log.split.name()
+    )?;
+    for (reason, drop) in log.drops.iter() {
+        let mut line = format!("{} ticks left out: {}", drop.count, reason.name());
+        let after_s = (drop.first_ns - log.start_ns) as f64 * 1e-9;
+        write!(line, ", first {after_s:.1} s after the start")?;
+        if let Some(example) = &drop.example {
+            write!(line, " ({example})")?;
+        }
+        writeln!(f, "  {line}")?;
+    }
+    for damage in log.damage.iter().take(LISTED) {
+        writeln!(f, "  byte {}: {}", damage.offset, damage.what)?;
+    }
+    if log.damage.len() > LISTED {
+        writeln!(f, "  ... and {} more, see logs/{}.json", log.damage.len() - LISTED, log.episode)?;
+    }
+    for (topic, (count, why)) in &log.undecodable {
+        writeln!(f, "  {topic}: {count} messages could not be decoded ({why})")?;
+    }
+    for (topic, count) in &log.out_of_order {
+        writeln!(f, "  {topic}: {count} messages came late and were put in order")?;
+    }
+    for left_out in &log.left_out {
+        writeln!(f, "  left out: {left_out}")?;
+    }
+    for note in &log.notes {
+        writeln!(f, "  note: {note}")?;
+    }
+    Ok(())
+}

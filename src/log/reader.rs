@@ -1,0 +1,487 @@
+//! MCAP bytes to messages: all that can be read is read, and what cannot is said.
+//!
+//! The file is walked record by record, so a damaged chunk costs that chunk and a truncated tail
+//! costs the tail. Every chunk's checksum is checked before its messages are used. Messages are
+//! handed on in file order together with their place, so that a second pass can fetch just the
+//! pictures and clouds that frames need.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufReader, Read, Seek, SeekFrom},
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use mcap::records::{ChunkHeader, Record, op};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// Longest record that is read, compressed or not. A chunk of 512 MiB is a hundred times what
+/// recorders write; a length beyond it is damage or an attack.
+pub const MAX_RECORD_BYTES: u64 = 512 << 20;
+
+/// Messages outside chunks are fetched in pieces of this size.
+const PLAIN_SEGMENT_BYTES: u64 = 4 << 20;
+
+const RECORD_HEADER_BYTES: u64 = 9;
+const MESSAGE_HEADER_BYTES: usize = 22;
+
+/// The definition of a message type, as the log carries it.
+#[derive(Debug, PartialEq, Eq)]
+pub struct SchemaRecord {
+    /// For example `nav_msgs/msg/Odometry`.
+    pub name: String,
+    /// For example `ros2msg`.
+    pub encoding: String,
+    pub data: Vec<u8>,
+}
+
+/// A topic of the log.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Channel {
+    pub id: u16,
+    pub topic: String,
+    /// For example `cdr`.
+    pub message_encoding: String,
+    /// `None` for messages without a definition (schema id 0).
+    pub schema: Option<Arc<SchemaRecord>>,
+}
+
+/// Where a message lies in the file: fetch it again with [`Log::segment`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    pub segment: u32,
+    /// Byte range of the message's data within the segment.
+    pub start: u32,
+    pub len: u32,
+}
+
+/// One message, as scanned.
+#[derive(Debug)]
+pub struct Message<'a> {
+    pub channel: &'a Arc<Channel>,
+    /// When it was recorded, ns since the Unix epoch.
+    pub log_time_ns: i64,
+    pub data: &'a [u8],
+    pub place: Place,
+}
+
+/// A part of the file that could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Damage {
+    /// Byte offset in the file.
+    pub offset: u64,
+    pub what: String,
+}
+
+/// A run of messages that is read and decompressed at once.
+#[derive(Debug)]
+enum Segment {
+    Chunk { data_offset: u64, stored_bytes: u64, header: ChunkHeader },
+    Plain { offset: u64, len: u64 },
+}
+
+/// A scanned log.
+#[derive(Debug)]
+pub struct Log {
+    pub path: PathBuf,
+    pub size_bytes: u64,
+    pub channels: BTreeMap<u16, Arc<Channel>>,
+    /// Messages a channel, by channel id.
+    pub counts: BTreeMap<u16, u64>,
+    /// Metadata records: name to keys and values, the first of each name.
+    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    pub damage: Vec<Damage>,
+    file: File,
+    segments: Vec<Segment>,
+}
+
+impl Log {
+    /// Walk the file once, handing every readable message to `on_message` in file order.
+    ///
+    /// Damage inside the file is collected in [`Log::damage`], it is not an error.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened or read, is empty, or does not begin as an MCAP file does;
+    /// and whatever `on_message` returns.
+    pub fn scan(path: &Path, on_message: &mut dyn FnMut(&Message) -> Result<()>) -> Result<Log> {
+        let file = File::open(path).map_err(Error::io("open", path))?;
+        let size_bytes = file.metadata().map_err(Error::io("examine", path))?.len();
+        let mut log = Log {
+            path: path.to_path_buf(),
+            size_bytes,
+            channels: BTreeMap::new(),
+            counts: BTreeMap::new(),
+            metadata: BTreeMap::new(),
+            damage: Vec::new(),
+            file,
+            segments: Vec::new(),
+        };
+        log.check_magic()?;
+        Walk { schemas: BTreeMap::new(), on_message }.run(&mut log)?;
+        Ok(log)
+    }
+
+    /// Messages that could be read.
+    pub fn message_count(&self) -> u64 {
+        self.counts.values().sum()
+    }
+
+    /// The bytes of a segment, decompressed; [`Place`]s point into them.
+    ///
+    /// # Errors
+    ///
+    /// If the file has changed or become unreadable since the scan.
+    pub fn segment(&self, index: u32) -> Result<Vec<u8>> {
+        match &self.segments[index as usize] {
+            Segment::Plain { offset, len } => self.read_at(*offset, *len),
+            Segment::Chunk { data_offset, stored_bytes, header } => {
+                let stored = self.read_at(*data_offset, *stored_bytes)?;
+                Ok(decompress(header, stored).0)
+            }
+        }
+    }
+
+    fn read_at(&self, offset: u64, len: u64) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; len as usize];
+        self.file.read_exact_at(&mut bytes, offset).map_err(Error::io("read", &self.path))?;
+        Ok(bytes)
+    }
+
+    fn check_magic(&self) -> Result<()> {
+        let fail = |what: &str, hint: &str| {
+            let (path, what, hint) = (self.path.clone(), what.to_string(), Some(hint.to_string()));
+            Err(Error::Log { path, offset: 0, what, hint })
+        };
+        if self.size_bytes == 0 {
+            return fail("the file is empty", "was the recorder stopped before it wrote anything?");
+        }
+        let head = self.read_at(0, self.size_bytes.min(mcap::MAGIC.len() as u64))?;
+        match head == mcap::MAGIC {
+            true => Ok(()),
+            false => fail(
+                "this is not an MCAP file: its first bytes are not the MCAP magic",
+                "rosbag2 .db3 and ROS 1 .bag files can be converted with `mcap convert`",
+            ),
+        }
+    }
+
+    /// Offsets of all chunks according to the summary at the end of the file, ascending.
+    ///
+    /// Empty where there is no usable summary: it only serves to find a way past damage.
+    fn indexed_chunk_offsets(&self) -> Vec<u64> {
+        let footer_bytes = RECORD_HEADER_BYTES + 20;
+        let tail = footer_bytes + mcap::MAGIC.len() as u64;
+        let Some(footer_at) = self.size_bytes.checked_sub(tail) else { return Vec::new() };
+        let Ok(footer) = self.read_at(footer_at, footer_bytes) else { return Vec::new() };
+        let body = &footer[RECORD_HEADER_BYTES as usize..];
+        let summary_start = match mcap::parse_record(footer[0], body) {
+            Ok(Record::Footer(footer)) => footer.summary_start,
+            _ => return Vec::new(),
+        };
+        let len = footer_at.saturating_sub(summary_start);
+        if summary_start == 0 || len > MAX_RECORD_BYTES {
+            return Vec::new();
+        }
+        let Ok(summary) = self.read_at(summary_start, len) else { return Vec::new() };
+        let mut offsets: Vec<u64> = Records::new(&summary)
+            .filter(|record| record.opcode == op::CHUNK_INDEX)
+            .filter_map(|record| match mcap::parse_record(record.opcode, record.body) {
+                Ok(Record::ChunkIndex(index)) => Some(index.chunk_start_offset),
+                _ => None,
+            })
+            .collect();
+        offsets.sort_unstable();
+        offsets
+    }
+}
+
+/// One pass over the file.
+struct Walk<'f> {
+    schemas: BTreeMap<u16, Arc<SchemaRecord>>,
+    on_message: &'f mut dyn FnMut(&Message) -> Result<()>,
+}
+
+impl Walk<'_> {
+    fn run(&mut self, log: &mut Log) -> Result<()> {
+        let path = log.path.clone();
+        let file = log.file.try_clone().map_err(Error::io("open", &path))?;
+        let mut reader = BufReader::with_capacity(1 << 20, file);
+        let mut offset = mcap::MAGIC.len() as u64;
+        reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
+        let mut body = Vec::new();
+
+        loop {
+            let left = log.size_bytes - offset;
+            let mut header = [0; RECORD_HEADER_BYTES as usize];
+            if left < RECORD_HEADER_BYTES {
+                log.damaged(offset, "the file is cut off: it ends without a footer");
+                return Ok(());
+            }
+            reader.read_exact(&mut header).map_err(Error::io("read", &path))?;
+            let (opcode, len) = (header[0], le_u64(&header[1..]));
+            let whole = len <= left - RECORD_HEADER_BYTES;
+            let known = (op::HEADER..=op::DATA_END).contains(&opcode) || opcode >= 0x80;
+            if !(known && whole && len <= MAX_RECORD_BYTES) {
+                let cut = known && !whole;
+                let next = log.indexed_chunk_offsets().into_iter().find(|at| *at > offset);
+                match next.filter(|at| *at < log.size_bytes) {
+                    Some(next) => {
+                        let what = format!("unreadable record; reading goes on at byte {next}");
+                        log.damaged(offset, &what);
+                        offset = next;
+                        reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
+                        continue;
+                    }
+                    // What is left of a cut chunk cannot be held against its checksum.
+                    None if cut && opcode == op::CHUNK => {
+                        log.damaged(offset, "the file is cut off in this chunk, which is left out");
+                    }
+                    None if cut => log.damaged(offset, "the file is cut off in this record"),
+                    None => log.damaged(offset, "unreadable record; nothing after it was read"),
+                }
+                return Ok(());
+            }
+
+            match opcode {
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK | op::METADATA => {
+                    body.resize(len as usize, 0);
+                    reader.read_exact(&mut body).map_err(Error::io("read", &path))?;
+                }
+                _ => reader.seek_relative(len as i64).map_err(Error::io("read", &path))?,
+            }
+            match opcode {
+                op::CHUNK => self.chunk(log, offset, &body)?,
+                op::MESSAGE => {
+                    let place = log.place_plain(offset, RECORD_HEADER_BYTES + len);
+                    self.record(log, opcode, &body, place)?;
+                }
+                op::SCHEMA | op::CHANNEL | op::METADATA => {
+                    self.record(log, opcode, &body, (0, 0))?;
+                }
+                op::DATA_END | op::FOOTER => return Ok(()),
+                _ => {}
+            }
+            offset += RECORD_HEADER_BYTES + len;
+        }
+    }
+
+    fn chunk(&mut self, log: &mut Log, offset: u64, body: &[u8]) -> Result<()> {
+        let Some((header, header_bytes)) = chunk_header(body) else {
+            log.damaged(offset, "chunk with an unreadable header");
+            return Ok(());
+        };
+        if header.uncompressed_size > MAX_RECORD_BYTES {
+            let what = format!("chunk that claims {} bytes", header.uncompressed_size);
+            log.damaged(offset, &what);
+            return Ok(());
+        }
+        if !["", "zstd", "lz4"].contains(&header.compression.as_str()) {
+            let what = format!("chunk with unknown compression `{}`", header.compression);
+            log.damaged(offset, &what);
+            return Ok(());
+        }
+        let stored = match body[header_bytes..].get(..header.compressed_size as usize) {
+            Some(stored) => stored.to_vec(),
+            None => {
+                log.damaged(offset, "chunk that claims more bytes than it has");
+                return Ok(());
+            }
+        };
+        let stored_bytes = header.compressed_size;
+        let (data, failure) = decompress(&header, stored);
+        if let Some(failure) = failure {
+            log.damaged(offset, &format!("chunk that does not decompress ({failure}), left out"));
+            return Ok(());
+        }
+        if header.uncompressed_crc != 0 && crc32fast::hash(&data) != header.uncompressed_crc {
+            log.damaged(offset, "chunk whose checksum does not match, left out");
+            return Ok(());
+        }
+        let segment = log.segments.len() as u32;
+        let data_offset = offset + RECORD_HEADER_BYTES + header_bytes as u64;
+        log.segments.push(Segment::Chunk { data_offset, stored_bytes, header });
+        let mut read = 0;
+        for record in Records::new(&data) {
+            read = record.start + record.body.len();
+            self.record(log, record.opcode, record.body, (segment, record.start as u32))?;
+        }
+        if read != data.len() {
+            log.damaged(offset, "chunk whose records do not fill it");
+        }
+        Ok(())
+    }
+
+    /// A record that tells something about the log; `place` is (segment, start of the body).
+    fn record(&mut self, log: &mut Log, opcode: u8, body: &[u8], place: (u32, u32)) -> Result<()> {
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Schema { header, data }) => {
+                let schema = SchemaRecord {
+                    name: header.name,
+                    encoding: header.encoding,
+                    data: data.into_owned(),
+                };
+                self.schemas.entry(header.id).or_insert_with(|| Arc::new(schema));
+            }
+            Ok(Record::Channel(channel)) => {
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                log.channels.entry(channel.id).or_insert_with(|| {
+                    Arc::new(Channel {
+                        id: channel.id,
+                        topic: channel.topic,
+                        message_encoding: channel.message_encoding,
+                        schema,
+                    })
+                });
+            }
+            Ok(Record::Message { header, data }) => {
+                let Some(channel) = log.channels.get(&header.channel_id) else {
+                    log.damaged(0, &format!("message of unknown channel {}", header.channel_id));
+                    return Ok(());
+                };
+                *log.counts.entry(header.channel_id).or_default() += 1;
+                let place = Place {
+                    segment: place.0,
+                    start: place.1 + MESSAGE_HEADER_BYTES as u32,
+                    len: data.len() as u32,
+                };
+                let log_time_ns = header.log_time as i64;
+                (self.on_message)(&Message { channel, log_time_ns, data: &data, place })?;
+            }
+            Ok(Record::Metadata(metadata)) => {
+                log.metadata.entry(metadata.name).or_insert(metadata.metadata);
+            }
+            Ok(_) => {}
+            Err(error) => log.damaged(0, &format!("record with opcode {opcode:#04x}: {error}")),
+        }
+        Ok(())
+    }
+}
+
+impl Log {
+    fn damaged(&mut self, offset: u64, what: &str) {
+        /// More than this says nothing more, and a hostile file must not fill the memory.
+        const MOST: usize = 1000;
+        if self.damage.len() < MOST {
+            self.damage.push(Damage { offset, what: what.to_string() });
+        }
+    }
+
+    /// The place of a message record outside chunks: (segment, start of the body).
+    fn place_plain(&mut self, offset: u64, record_bytes: u64) -> (u32, u32) {
+        let fits = match self.segments.last() {
+            Some(Segment::Plain { offset: from, len }) => {
+                from + len == offset && len + record_bytes <= PLAIN_SEGMENT_BYTES
+            }
+            _ => false,
+        };
+        if !fits {
+            self.segments.push(Segment::Plain { offset, len: 0 });
+        }
+        let index = self.segments.len() - 1;
+        let Segment::Plain { len, .. } = &mut self.segments[index] else {
+            unreachable!("a plain segment was just made sure of")
+        };
+        let start = *len + RECORD_HEADER_BYTES;
+        *len += record_bytes;
+        (index as u32, start as u32)
+    }
+}
+
+/// Records of a decompressed chunk or of the summary, as far as they are whole.
+struct Records<'a> {
+    data: &'a [u8],
+    at: usize,
+}
+
+struct RawRecord<'a> {
+    opcode: u8,
+    body: &'a [u8],
+    /// Where the body starts.
+    start: usize,
+}
+
+impl<'a> Records<'a> {
+    fn new(data: &'a [u8]) -> Self {
+        Records { data, at: 0 }
+    }
+}
+
+impl<'a> Iterator for Records<'a> {
+    type Item = RawRecord<'a>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let start = self.at + RECORD_HEADER_BYTES as usize;
+        let header = self.data.get(self.at..start)?;
+        let len = usize::try_from(le_u64(&header[1..])).ok()?;
+        let body = self.data.get(start..start.checked_add(len)?)?;
+        self.at = start + len;
+        Some(RawRecord { opcode: header[0], body, start })
+    }
+}
+
+/// Header of a chunk and its length.
+fn chunk_header(body: &[u8]) -> Option<(ChunkHeader, usize)> {
+    // start, end and size (8 each), checksum (4), then the compression's name with its length.
+    let name_len = u32::from_le_bytes(body.get(28..32)?.try_into().ok()?) as usize;
+    let name = body.get(32..32usize.checked_add(name_len)?)?;
+    let header_bytes = 32 + name_len + 8;
+    let header = ChunkHeader {
+        message_start_time: le_u64(body.get(0..8)?),
+        message_end_time: le_u64(body.get(8..16)?),
+        uncompressed_size: le_u64(body.get(16..24)?),
+        uncompressed_crc: u32::from_le_bytes(body.get(24..28)?.try_into().ok()?),
+        compression: String::from_utf8(name.to_vec()).ok()?,
+        compressed_size: le_u64(body.get(header_bytes - 8..header_bytes)?),
+    };
+    Some((header, header_bytes))
+}
+
+/// As much of a chunk as can be decompressed, and why it is not all.
+fn decompress(header: &ChunkHeader, stored: Vec<u8>) -> (Vec<u8>, Option<String>) {
+    let expected = header.uncompressed_size;
+    let mut data = Vec::with_capacity(expected.min(16 << 20) as usize);
+    let read = match header.compression.as_str() {
+        "" => return (stored, None),
+        "zstd" => zstd::Decoder::with_buffer(stored.as_slice())
+            .and_then(|decoder| decoder.take(expected).read_to_end(&mut data)),
+        _ => lz4::Decoder::new(stored.as_slice())
+            .and_then(|decoder| decoder.take(expected).read_to_end(&mut data)),
+    };
+    let failure = match read {
+        Err(error) => Some(error.to_string()),
+        Ok(_) if (data.len() as u64) < expected => Some("it is shorter than it claims".to_string()),
+        Ok(_) => None,
+    };
+    (data, failure)
+}
+
+fn le_u64(bytes: &[u8]) -> u64 {
+    bytes.iter().take(8).rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
+}
+
+/// SHA-256 of a whole file, lower-case hexadecimal.
+///
+/// # Errors
+///
+/// [`Error::Io`] if the file cannot be read.
+pub fn sha256_of_file(path: &Path) -> Result<String> {
+    let mut file = File::open(path).map_err(Error::io("open", path))?;
+    let mut hasher = Sha256::new();
+    let mut buffer = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut buffer).map_err(Error::io("read", path))? {
+            0 => return Ok(hex(&hasher.finalize())),
+            len => hasher.update(&buffer[..len]),
+        }
+    }
+}
+
+/// Lower-case hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,158 @@
+//! Where each frame sits: the transforms of `/tf_static` and `/tf` as one tree.
+
+use std::collections::BTreeMap;
+
+use glam::{DQuat, DVec3};
+
+use crate::log::signals::{Header, Pose};
+
+/// Longest step between two dynamic transforms that is interpolated across.
+const MAX_GAP_NS: i64 = 500_000_000;
+
+/// Longest chain of frames that is followed: a loop in the tree must not hang us.
+const MAX_CHAIN: usize = 64;
+
+impl Pose {
+    pub const IDENTITY: Pose = Pose { position_m: DVec3::ZERO, rotation: DQuat::IDENTITY };
+
+    /// A point of the child frame, in the parent frame.
+    pub fn transform_point(&self, point_m: DVec3) -> DVec3 {
+        self.rotation * point_m + self.position_m
+    }
+
+    /// `parent_from_child` of `child_from_grandchild` is `parent_from_grandchild`.
+    pub fn then(&self, child_from_grandchild: &Pose) -> Pose {
+        Pose {
+            position_m: self.transform_point(child_from_grandchild.position_m),
+            rotation: (self.rotation * child_from_grandchild.rotation).normalize(),
+        }
+    }
+
+    /// `child_from_parent`.
+    pub fn inverse(&self) -> Pose {
+        let rotation = self.rotation.inverse();
+        Pose { position_m: rotation * -self.position_m, rotation }
+    }
+
+    /// Between two poses: straight for the position, the shorter way round for the rotation.
+    pub fn interpolate(&self, other: &Pose, fraction: f64) -> Pose {
+        Pose {
+            position_m: self.position_m.lerp(other.position_m, fraction),
+            rotation: self.rotation.slerp(other.rotation, fraction),
+        }
+    }
+}
+
+/// Transforms of one child frame.
+#[derive(Clone, Debug)]
+struct Link {
+    parent: String,
+    /// `parent_from_child` by stamp; a single one holds for all times.
+    poses: Vec<(i64, Pose)>,
+    is_static: bool,
+}
+
+/// All transforms of a log.
+#[derive(Clone, Debug, Default)]
+pub struct TransformTree {
+    links: BTreeMap<String, Link>,
+}
+
+impl TransformTree {
+    /// Add one `parent_from_child`. A frame's parent is the first that it was given.
+    pub fn insert(
+        &mut self,
+        header: &Header,
+        child: &str,
+        parent_from_child: Pose,
+        is_static: bool,
+    ) {
+        let link = self.links.entry(child.to_string()).or_insert_with(|| Link {
+            parent: header.frame_id.clone(),
+            poses: Vec::new(),
+            is_static,
+        });
+        if link.parent != header.frame_id {
+            return;
+        }
+        match link.is_static {
+            true if !link.poses.is_empty() => {}
+            _ => link.poses.push((header.stamp_ns, parent_from_child)),
+        }
+    }
+
+    /// Sort by stamp; call once after the last [`insert`](TransformTree::insert).
+    pub fn finish(&mut self) {
+        for link in self.links.values_mut() {
+            link.poses.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+        }
+    }
+
+    /// `target_from_source` at a time.
+    ///
+    /// # Errors
+    ///
+    /// A sentence that names both frames and what the tree has.
+    pub fn lookup(&self, target: &str, source: &str, stamp_ns: i64) -> Result<Pose, String> {
+        let missing = || {
+            let have = self.links();
+            let have = if have.is_empty() { "none".to_string() } else { have.join(", ") };
+            format!("no transform from `{source}` to `{target}`; the log has {have}")
+        };
+        let up_from_source = self.chain(source, stamp_ns);
+        let up_from_target = self.chain(target, stamp_ns);
+        for (frame, frame_from_source) in &up_from_source {
+            let common = up_from_target.iter().find(|(other, _)| other == frame);
+            if let Some((_, frame_from_target)) = common {
+                return Ok(frame_from_target.inverse().then(frame_from_source));
+            }
+        }
+        Err(missing())
+    }
+
+    /// All links as `parent -> child`, by child.
+    pub fn links(&self) -> Vec<String> {
+        self.links.iter().map(|(child, link)| format!("{} -> {child}", link.parent)).collect()
+    }
+
+    /// Poses of one dynamic frame in its parent, with the parent's name.
+    pub fn track(&self, child: &str) -> Option<(&str, &[(i64, Pose)])> {
+        let link = self.links.get(child).filter(|link| !link.is_static)?;
+        Some((&link.parent, &link.poses))
+    }
+
+    /// The frame and all above it, each with `frame_from_start`.
+    fn chain<'a>(&'a self, start: &'a str, stamp_ns: i64) -> Vec<(&'a str, Pose)> {
+        let mut chain = vec![(start, Pose::IDENTITY)];
+        while let Some(link) = self.links.get(chain[chain.len() - 1].0) {
+            let Some(parent_from_child) = link.at(stamp_ns) else { break };
+            let frame_from_start = parent_from_child.then(&chain[chain.len() - 1].1);
+            chain.push((&link.parent, frame_from_start));
+            if chain.len() > MAX_CHAIN {
+                break;
+            }
+        }
+        chain
+    }
+}
+
+impl Link {
+    fn at(&self, stamp_ns: i64) -> Option<Pose> {
+        if self.is_static {
+            return self.poses.first().map(|(_, pose)| *pose);
+        }
+        let after = self.poses.partition_point(|(stamp, _)| *stamp < stamp_ns);
+        let next = self.poses.get(after);
+        if let Some((stamp, pose)) = next.filter(|(stamp, _)| *stamp == stamp_ns) {
+            debug_assert_eq!(*stamp, stamp_ns);
+            return Some(*pose);
+        }
+        let (earlier_ns, earlier) = self.poses.get(after.checked_sub(1)?)?;
+        let (later_ns, later) = next?;
+        if later_ns - earlier_ns > MAX_GAP_NS {
+            return None;
+        }
+        let fraction = (stamp_ns - earlier_ns) as f64 / (later_ns - earlier_ns) as f64;
+        Some(earlier.interpolate(later, fraction))
+    }
+}
