@@ -32,8 +32,8 @@ enum Command {
     /// Compare plans with what the recorded driver did, on the frames held out from training
     ///
     /// `constant-velocity` and `stand-still` are always evaluated too: a number means little
-    /// without them. DIR gets table.md, table.csv, table.tex, errors.parquet (one row per policy
-    /// and frame) and report.json, written last. A report that is already there is kept.
+    /// without them. DIR gets table.md, table.csv, table.tex, speed.svg, errors.parquet (one row
+    /// per policy and frame) and report.json, written last. A report that is already there is kept.
     #[command(after_help = AFTER)]
     Offline {
         /// Run directory, or `constant-velocity`, `stand-still`, `recorded` (an oracle); repeatable

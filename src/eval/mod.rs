@@ -1,7 +1,7 @@
 //! Policies in, numbers that can be trusted out.
 //!
 //! ```text
-//! frames + policies -- offline --> errors per frame -- summary --> REPORT -- render --> md, csv, tex
+//! frames + policies -- offline --> errors per frame -- summary --> REPORT -- render --> md, csv, tex; plot --> svg
 //!            |                          |                            |
 //!        baseline            store: errors.parquet          store: report.json
 //! ```
@@ -18,4 +18,5 @@ pub mod offline;
 pub mod report;
 pub mod summary;
 pub mod render;
+pub mod plot;
 pub mod store;

@@ -20,7 +20,7 @@ const SLICED: [&str; 2] = ["ade_3s", HEADLINE];
 pub fn markdown(report: &Report) -> String {
     let mut blocks = vec![
         format!("# Offline evaluation on {}\n", report.dataset.name),
-        lines(&report.caveats, |caveat| format!("> **{caveat}**\n>\n")),
+        lines(&report.caveats, |caveat| format!("> **{caveat}**\n\n")),
         basis(report),
         metrics_table(report),
         lines(&verdicts(report), |verdict| format!("- {verdict}\n")),
@@ -34,7 +34,8 @@ pub fn markdown(report: &Report) -> String {
         }),
     ];
     blocks.retain(|block| !block.is_empty());
-    blocks.join("\n")
+    blocks.iter_mut().for_each(|block| block.truncate(block.trim_end().len()));
+    blocks.join("\n\n") + "\n"
 }
 
 /// One policy a row; `KEY`, `KEY_low`, `KEY_high` (ends of the interval) and `KEY_frames` for every
@@ -98,7 +99,7 @@ fn basis(report: &Report) -> String {
     let bootstrap = &intervals.bootstrap;
     format!(
         "Evaluated: {}/{} frames of {}/{} episodes. Held out by {}: {}.\n\
-         Intervals: {:.0} %, percentile bootstrap, {} resamples of {} {}, seed {}.\n",
+         Intervals: {:.0} %, percentile bootstrap, {} resamples of {}, seed {}.\n",
         evaluated.frames,
         holdout.frames,
         evaluated.episodes,
@@ -107,8 +108,7 @@ fn basis(report: &Report) -> String {
         holdout.how,
         bootstrap.level * 100.0,
         bootstrap.resamples,
-        intervals.units,
-        intervals.unit.text(),
+        intervals.unit.counted(intervals.units),
         bootstrap.seed,
     )
 }
@@ -129,7 +129,7 @@ fn metrics_table(report: &Report) -> String {
     text
 }
 
-/// What can be said, and of which policies nothing can.
+/// What can be said of the policies against the reference.
 fn verdicts(report: &Report) -> Vec<&str> {
     let paired = report.policies.iter().filter_map(|policy| policy.paired.as_ref());
     paired.map(|paired| paired.sentence.as_str()).collect()

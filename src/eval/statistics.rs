@@ -22,17 +22,19 @@ pub const FEWEST_UNITS: usize = 6;
 pub enum Unit {
     /// Whole episodes: the interval speaks of other drives.
     Episodes,
-    /// Contiguous 3 s blocks of frames: the interval speaks of more of the same drives.
+    /// Contiguous 3 s blocks of frames: the interval speaks of more of the same drives, and is
+    /// somewhat too narrow, as the last frames of a block look into the next one.
     #[serde(rename = "blocks-of-3s")]
     Blocks,
 }
 
 impl Unit {
-    /// As written in a sentence after a count.
-    pub fn text(self) -> &'static str {
+    /// So many of them, in words: `1 episode`, `14 contiguous blocks of 3 s`.
+    pub fn counted(self, count: u64) -> String {
+        let s = if count == 1 { "" } else { "s" };
         match self {
-            Unit::Episodes => "episodes",
-            Unit::Blocks => "contiguous blocks of 3 s",
+            Unit::Episodes => format!("{count} episode{s}"),
+            Unit::Blocks => format!("{count} contiguous block{s} of 3 s"),
         }
     }
 }

@@ -1,5 +1,5 @@
-//! A report on disk: `table.md`, `table.csv`, `table.tex`, `errors.parquet`, and `report.json`
-//! last, whose presence means that the directory is whole.
+//! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `errors.parquet`, and
+//! `report.json` last, whose presence means that the directory is whole.
 
 use std::{
     fs,
@@ -26,7 +26,7 @@ use crate::{
     eval::{
         definitions::{Aggregate, METRICS, Metric},
         offline::{Errors, PolicyErrors},
-        render,
+        plot, render,
         report::{Dataset, Report, VERSION},
     },
 };
@@ -84,6 +84,7 @@ pub fn write(directory: &Path, report: &Report, errors: &Errors) -> Result<()> {
         ("table.md", render::markdown(report)),
         ("table.csv", render::csv(report)),
         ("table.tex", render::latex(report)),
+        ("speed.svg", plot::speed_errors(report)),
         ("report.json", json(report)?),
     ];
     for (name, text) in texts {

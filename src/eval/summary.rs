@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 
 use crate::{
@@ -43,7 +44,7 @@ pub fn summarise(
             name: policy.name.clone(),
             sees_the_future: policy.sees_the_future,
             metrics: METRICS
-                .iter()
+                .par_iter()
                 .map(|m| (m.key.to_string(), estimate(m, &policy.rows, &unit_of, &bootstrap)))
                 .collect(),
             slices: slices(&errors.frames, &policy.rows),
@@ -107,18 +108,16 @@ fn caveats(holdout: &Holdout, errors: &Errors, intervals: &Intervals) -> Vec<Str
         caveats.push(format!("Only {frames} of {} held-out frames were read.", holdout.frames));
     }
     if intervals.unit == Unit::Blocks {
-        let episodes = errors.episodes.len();
         caveats.push(format!(
-            "Intervals are over blocks of 3 s of {episodes} episode{}: they speak of more of the \
-             same drives, not of others.",
-            if episodes == 1 { "" } else { "s" }
+            "Intervals are over blocks of 3 s of {}: they speak of more of the same drives, not \
+             of others.",
+            Unit::Episodes.counted(errors.episodes.len() as u64)
         ));
     }
     if intervals.units < FEWEST_UNITS as u64 {
         caveats.push(format!(
-            "{} {} are too few for any claim; {FEWEST_UNITS} are the fewest.",
-            intervals.units,
-            intervals.unit.text()
+            "Too few for any claim: {}, and {FEWEST_UNITS} are the fewest.",
+            intervals.unit.counted(intervals.units)
         ));
     }
     for policy in errors.policies.iter().filter(|policy| policy.sees_the_future) {
@@ -227,16 +226,16 @@ fn paired(
 
 /// The verdict in words, with the numbers it rests on.
 fn sentence(name: &str, paired: &Paired, intervals: &Intervals) -> String {
-    let Paired { reference, frames, units, policy, of_reference, difference, .. } = paired;
+    let Paired { reference, frames, policy, of_reference, difference, .. } = paired;
     let on = "on speed at 3 s";
     let percent = intervals.bootstrap.level * 100.0;
     let interval = paired.interval.map_or("no interval".to_string(), |[low, high]| {
         format!("{percent:.0} % interval {low:.3} ... {high:.3}")
     });
-    let unit = intervals.unit.text();
+    let units = intervals.unit.counted(paired.units);
     let numbers = format!(
         "{policy:.3} against {of_reference:.3} m/s (difference {difference:.3}, {interval}, \
-         n = {frames} frames in {units} {unit})"
+         n = {frames} frames in {units})"
     );
     match paired.verdict {
         Verdict::Beats => format!("`{name}` beats {reference} {on}: {numbers}"),
@@ -248,7 +247,7 @@ fn sentence(name: &str, paired: &Paired, intervals: &Intervals) -> String {
         }
         Verdict::TooFew => format!(
             "no difference can be claimed between `{name}` and {reference} {on}, \
-             {units} {unit} are too few: {numbers}"
+             too few for a claim: {numbers}"
         ),
     }
 }
