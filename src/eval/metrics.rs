@@ -16,7 +16,7 @@ pub const HORIZON_STEPS: [usize; 3] = [10, 20, 30];
 /// Central intervals of which the coverage is reported.
 pub const CENTRAL_SHARES: [f64; 3] = [0.5, 0.8, 0.95];
 
-/// Speed is likened to yaw in this unit: 10 m/s is 1 (paper §III.C4, as `v / 10`).
+/// Speed is likened to yaw in this unit: 10 m/s is 1. The paper does not say its units.
 pub const SPEED_UNIT_MPS: f64 = 10.0;
 
 /// What a plan got wrong at one frame; `None` where the frame or the plan has nothing to compare.
@@ -85,7 +85,7 @@ pub fn signed_speed_mps([vx, vy]: [f32; 2]) -> f32 {
 
 /// Absolute errors of steer, throttle and brake (dimensionless), where the log has the channel.
 ///
-/// L1 of the paper's direct action (§III.C4).
+/// L1 of the paper's direct action (§III.C3).
 pub fn action_l1(planned: Action, recorded: RecordedAction) -> [Option<f64>; 3] {
     [
         (planned.steer, recorded.steer),
@@ -120,7 +120,7 @@ pub fn wrapped_rad(angle_rad: f64) -> f64 {
 /// One weight per mode for the whole manoeuvre; speed in units of 10 m/s ([`SPEED_UNIT_MPS`])
 /// and yaw in rad, so a density and not a probability: it may be negative. Yaw residuals are
 /// wrapped. `None` without modes, without a valid step, or where a mode claims no deviations.
-/// Source: paper §III.C4, with one weight per trajectory.
+/// Source: paper §III.C4, which leaves open that a weight holds for the whole manoeuvre.
 pub fn nll_nats(modes: &[Mode], future: &Future) -> Option<f64> {
     let steps = usize::from(future.len);
     if steps == 0 || modes.is_empty() {

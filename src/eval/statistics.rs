@@ -39,7 +39,7 @@ impl Unit {
     }
 }
 
-/// A percentile bootstrap (PAPER 3.3): the same numbers and settings give the same interval.
+/// A percentile bootstrap (Efron, 1979): the same numbers and settings give the same interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bootstrap {
     /// Share of resamples inside the interval.
