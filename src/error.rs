@@ -49,6 +49,14 @@ pub enum Error {
     #[error(transparent)]
     Tensor(#[from] candle_core::Error),
 
+    /// A policy that could not plan, or planned what is no motion.
+    #[error("policy `{policy}`, episode {episode}, frame {frame}: {what}")]
+    Policy { policy: String, episode: String, frame: u32, what: String, hint: Option<String> },
+
+    /// An evaluation directory or file that is not what it should be.
+    #[error("{what}: {}", path.display())]
+    Report { path: PathBuf, what: String, hint: Option<String> },
+
     /// Arrow refused a column or a batch.
     #[error("columns of {}: {source}", path.display())]
     Arrow { path: PathBuf, source: arrow::error::ArrowError },
@@ -103,6 +111,8 @@ impl Error {
             Error::Log { hint, .. }
             | Error::Dataset { hint, .. }
             | Error::Run { hint, .. }
+            | Error::Policy { hint, .. }
+            | Error::Report { hint, .. }
             | Error::Config { hint, .. } => hint.clone(),
             Error::Mapping { hint, .. } => Some(hint.clone()),
             Error::Definition { schema, .. } => Some(format!(

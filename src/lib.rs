@@ -19,4 +19,5 @@ pub mod frame;
 pub mod log;
 pub mod policy;
 pub mod dataset;
+pub mod eval;
 pub mod cli;

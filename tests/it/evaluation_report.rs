@@ -1,0 +1,553 @@
+//! The report: its verdicts, its renderings, its schema, and the command that prints it.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use parquet::{
+    file::reader::{FileReader as _, SerializedFileReader},
+    record::RowAccessor as _,
+};
+use pmp::{
+    error::Result,
+    eval::{
+        baseline::baseline,
+        definitions::METRICS,
+        metrics::signed_speed_mps,
+        offline::{Errors, evaluate},
+        plot, render,
+        report::{Dataset, Holdout, HoldoutKind, Report, Verdict},
+        statistics::{Bootstrap, Unit},
+        store,
+        summary::summarise,
+    },
+    frame::Frame,
+    policy::{Plan, Policy},
+};
+use serde_json::Value;
+
+use crate::evaluation::{accelerating, steady};
+
+/// Keeps its speed, and is off by that much more.
+struct Offset(f32);
+
+impl Policy for Offset {
+    fn name(&self) -> &str {
+        "run_1"
+    }
+
+    fn reset(&mut self) {}
+
+    fn plan(&mut self, frame: &Frame) -> Result<Plan> {
+        let speed_mps = signed_speed_mps(frame.velocity_mps) + self.0;
+        let motion = vec![steady(1.0, speed_mps, 0.0, Some([2.0, 0.1]))];
+        Ok(Plan { action: None, motion })
+    }
+}
+
+/// Drives of `frames` frames each, the last 30 without their whole future. The first starts at
+/// 2 m/s and accelerates by 0.25 m/s2, each further one is 3 m/s and 0.125 m/s2 faster.
+fn drives(episodes: u32, frames: u32) -> Vec<Result<(String, Frame)>> {
+    let frame = |episode: u32, i: u32| {
+        let mut frame =
+            accelerating(i, 2.0 + 3.0 * f64::from(episode), 0.25 + 0.125 * f64::from(episode));
+        frame.future.len = (frames - 1 - i).min(30) as u8;
+        Ok((format!("drive-{episode}"), frame))
+    };
+    (0..episodes).flat_map(|e| (0..frames).map(move |i| (e, i))).map(|(e, i)| frame(e, i)).collect()
+}
+
+fn errors(offset_mps: f32, episodes: u32, frames: u32) -> Errors {
+    let mut policies: Vec<Box<dyn Policy>> = vec![
+        Box::new(Offset(offset_mps)),
+        baseline("constant-velocity").unwrap(),
+        baseline("stand-still").unwrap(),
+    ];
+    evaluate(&mut policies, drives(episodes, frames)).unwrap()
+}
+
+fn report_of(errors: &Errors, weak: bool) -> Report {
+    let dataset = Dataset { name: "town".into(), manifest_sha256: "ab".repeat(32) };
+    let holdout = Holdout {
+        kind: if weak { HoldoutKind::TimeBlock } else { HoldoutKind::Episodes },
+        how: if weak { "the last eighth of each drive" } else { "by hash of the id" }.into(),
+        weak,
+        frames: errors.frames.len() as u64,
+        episodes: errors.episodes.len() as u64,
+    };
+    let bootstrap = Bootstrap { resamples: 200, ..Bootstrap::default() };
+    summarise(dataset, holdout, errors, bootstrap)
+}
+
+fn report(offset_mps: f32, episodes: u32, frames: u32) -> Report {
+    report_of(&errors(offset_mps, episodes, frames), false)
+}
+
+fn verdict(report: &Report) -> (Verdict, &str) {
+    let paired = report.policies[0].paired.as_ref().unwrap();
+    (paired.verdict, &paired.sentence)
+}
+
+#[test]
+fn verdict_says_no_more_than_the_interval_allows() {
+    let better = report(1.0, 8, 60);
+    assert_eq!(verdict(&better).0, Verdict::Beats);
+    insta::assert_snapshot!(verdict(&better).1, @"`run_1` beats constant-velocity on speed at 3 s: 1.125 against 2.062 m/s (difference -0.938, 95 % interval -1.000 ... -0.750, n = 240 frames in 8 episodes)");
+    let worse = report(-1.0, 8, 60);
+    assert_eq!(verdict(&worse).0, Verdict::Worse);
+    insta::assert_snapshot!(verdict(&worse).1, @"`run_1` does not beat constant-velocity on speed at 3 s, it is worse: 3.062 against 2.062 m/s (difference 1.000, 95 % interval 1.000 ... 1.000, n = 240 frames in 8 episodes)");
+    let same = report(3.0, 6, 60);
+    assert_eq!(verdict(&same).0, Verdict::NoDifference);
+    insta::assert_snapshot!(verdict(&same).1, @"no difference can be claimed between `run_1` and constant-velocity on speed at 3 s: 1.312 against 1.688 m/s (difference -0.375, 95 % interval -1.500 ... 0.875, n = 180 frames in 6 episodes)");
+    let short = report(1.0, 1, 60);
+    assert_eq!(verdict(&short).0, Verdict::TooFew);
+    insta::assert_snapshot!(verdict(&short).1, @"no difference can be claimed between `run_1` and constant-velocity on speed at 3 s, too few for a claim: 0.250 against 0.750 m/s (difference -0.500, no interval, n = 30 frames in 1 contiguous block of 3 s)");
+}
+
+#[test]
+fn few_episodes_are_resampled_in_blocks_of_three_seconds_and_the_report_says_so() {
+    let few = report(1.0, 2, 200);
+    assert_eq!((few.intervals.unit, few.intervals.units), (Unit::Blocks, 14));
+    insta::assert_snapshot!(few.caveats.join("\n"), @"Intervals are over blocks of 3 s of 2 episodes: they speak of more of the same drives, not of others.");
+    let many = report(1.0, 6, 40);
+    assert_eq!((many.intervals.unit, many.intervals.units), (Unit::Episodes, 6));
+    assert!(many.caveats.is_empty());
+}
+
+#[test]
+fn slices_partition_the_frames() {
+    let report = report(1.0, 6, 40);
+    for policy in &report.policies {
+        for by in ["command", "speed"] {
+            let slices = policy.slices.iter().filter(|slice| slice.by == by);
+            assert_eq!(slices.map(|slice| slice.frames).sum::<u64>(), report.evaluated.frames);
+        }
+    }
+    // Speeds of the six drives: 2, 5, 8, 11, 14, 17 m/s.
+    let speed = report.policies[0].slices.iter().filter(|slice| slice.by == "speed");
+    let frames: Vec<_> = speed.map(|slice| (slice.name.as_str(), slice.frames)).collect();
+    assert_eq!(frames, [("0-5", 40), ("5-10", 80), ("10-15", 80), ("15+", 40)]);
+}
+
+#[test]
+fn root_mean_square_weighs_large_errors_more() {
+    // Two drives of equal length; keeping the speed is off by 0.75 and 1.125 m/s after 3 s,
+    // standing still by 2.75 and 6.125 m/s.
+    let report = report(0.0, 2, 60);
+    for (policy, low, high) in [(1, 0.75f64, 1.125f64), (2, 2.75, 6.125)] {
+        let value = |key: &str| report.policies[policy].metrics[key].value.unwrap();
+        assert!((value("speed_mae_3s") - (low + high) / 2.0).abs() < 1e-6);
+        let rms = ((low * low + high * high) / 2.0).sqrt();
+        assert!((value("speed_rmse_3s") - rms).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn weak_report_says_so_in_its_first_lines_and_in_its_json() {
+    let weak = report_of(&errors(1.0, 1, 60), true);
+    let markdown = render::markdown(&weak);
+    let head: Vec<_> = markdown.lines().take(3).collect();
+    assert!(head.join("\n").contains("Weak evidence"), "{head:?}");
+    assert!(head.join("\n").contains("the last eighth of each drive"), "{head:?}");
+    let json: Value = serde_json::from_str(&store::json(&weak).unwrap()).unwrap();
+    assert_eq!(json["holdout"]["weak"], Value::Bool(true));
+    assert!(json["caveats"][0].as_str().unwrap().starts_with("Weak evidence"));
+    assert!(render::latex(&weak).starts_with("% Weak evidence"));
+    assert!(render::csv(&weak).lines().nth(1).unwrap().starts_with("town,time block,true,run_1"));
+}
+
+#[test]
+fn frames_that_were_not_read_are_counted_in_the_first_lines() {
+    let errors = errors(1.0, 6, 40);
+    let mut report = report_of(&errors, false);
+    report.holdout.frames = 241;
+    let again = summarise(report.dataset, report.holdout, &errors, report.intervals.bootstrap);
+    assert_eq!(again.caveats, ["Only 240 of 241 held-out frames were read."]);
+}
+
+#[test]
+fn oracle_is_marked_and_never_said_to_beat_anything() {
+    let mut policies = [baseline("recorded").unwrap(), baseline("constant-velocity").unwrap()];
+    let errors = evaluate(&mut policies, drives(6, 60)).unwrap();
+    let report = report_of(&errors, false);
+    assert_eq!(report.policies[0].paired, None);
+    assert_eq!(report.policies[1].paired, None, "nothing to compare the reference with");
+    assert_eq!(
+        report.caveats,
+        ["`recorded` reads what the driver did next: it is a floor, not a driver."]
+    );
+}
+
+#[test]
+fn markdown_table_shows_counts_intervals_and_dashes() {
+    let markdown = render::markdown(&report(1.0, 6, 40));
+    let until = markdown.find("What the numbers are").unwrap();
+    insta::assert_snapshot!(&markdown[..until], @"
+    # Offline evaluation on town
+
+    Evaluated: 240/240 frames of 6/6 episodes. Held out by episodes: by hash of the id.
+    Intervals: 95 %, percentile bootstrap, 200 resamples of 6 episodes, seed 0.
+
+    | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
+    |---|---|---|---:|---:|---:|---:|
+    | Steer L1 | – | lower | 240/240 | – | – | 0.250 [0.250, 0.250] |
+    | Throttle L1 | – | lower | 240/240 | – | – | 0.500 [0.500, 0.500] |
+    | Brake L1 | – | lower | 0/240 | – | – | – |
+    | ADE 1 s | m | lower | 180/240 | 0.392 [0.356, 0.432] | 0.108 [0.068, 0.144] | 4.858 [2.318, 7.144] |
+    | ADE 2 s | m | lower | 120/240 | 0.596 [0.462, 0.746] | 0.404 [0.254, 0.538] | 9.904 [4.754, 14.538] |
+    | ADE 3 s | m | lower | 60/240 | 0.669 [0.471, 0.942] | 0.886 [0.558, 1.182] | 15.136 [7.308, 22.182] |
+    | FDE 1 s | m | lower | 180/240 | 0.669 [0.575, 0.773] | 0.281 [0.177, 0.375] | 9.306 [4.452, 13.675] |
+    | FDE 2 s | m | lower | 120/240 | 0.825 [0.450, 1.242] | 1.125 [0.708, 1.500] | 19.650 [9.483, 28.800] |
+    | FDE 3 s | m | lower | 60/240 | 0.890 [0.467, 1.450] | 2.531 [1.594, 3.375] | 30.556 [14.869, 44.675] |
+    | minADE 3 s | m | lower | 60/240 | 0.669 [0.471, 0.942] | 0.886 [0.558, 1.182] | 15.136 [7.308, 22.182] |
+    | Speed error 1 s | m/s | lower | 180/240 | 0.438 [0.250, 0.646] | 0.562 [0.354, 0.750] | 10.062 [4.854, 14.750] |
+    | Speed error 2 s | m/s | lower | 120/240 | 0.375 [0.208, 0.583] | 1.125 [0.708, 1.500] | 10.625 [5.208, 15.500] |
+    | Speed error 3 s | m/s | lower | 60/240 | 0.771 [0.354, 1.251] | 1.688 [1.062, 2.250] | 11.188 [5.562, 16.250] |
+    | Speed RMSE 1 s | m/s | lower | 180/240 | 0.487 [0.306, 0.663] | 0.602 [0.385, 0.771] | 11.390 [6.153, 15.398] |
+    | Speed RMSE 2 s | m/s | lower | 120/240 | 0.445 [0.270, 0.612] | 1.203 [0.770, 1.541] | 11.987 [6.526, 16.167] |
+    | Speed RMSE 3 s | m/s | lower | 60/240 | 0.940 [0.414, 1.358] | 1.805 [1.155, 2.312] | 12.585 [6.900, 16.936] |
+    | Heading error 3 s | rad | lower | 60/240 | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
+    | NLL per number | nats | lower | 60/240 | -1.012 [-1.019, -1.003] | – | – |
+    | Coverage of 50 % | – | near 0.5 | 60/240 | 0.989 [0.967, 1.000] | – | – |
+    | Coverage of 80 % | – | near 0.8 | 60/240 | 1.000 [1.000, 1.000] | – | – |
+    | Coverage of 95 % | – | near 0.95 | 60/240 | 1.000 [1.000, 1.000] | – | – |
+
+    - `run_1` beats constant-velocity on speed at 3 s: 0.771 against 1.688 m/s (difference -0.917, 95 % interval -1.000 ... -0.750, n = 60 frames in 6 episodes)
+    - `stand-still` does not beat constant-velocity on speed at 3 s, it is worse: 11.188 against 1.688 m/s (difference 9.500, 95 % interval 4.500 ... 14.000, n = 60 frames in 6 episodes)
+
+    | slice | frames | ADE 3 s `run_1` | ADE 3 s `constant-velocity` | ADE 3 s `stand-still` | Speed error 3 s `run_1` | Speed error 3 s `constant-velocity` | Speed error 3 s `stand-still` |
+    |---|---:|---:|---:|---:|---:|---:|---:|
+    | command follow | 240/240 | 0.669 (n = 60) | 0.886 (n = 60) | 15.136 (n = 60) | 0.771 (n = 60) | 1.688 (n = 60) | 11.188 (n = 60) |
+    | command left | 0/240 | – | – | – | – | – | – |
+    | command right | 0/240 | – | – | – | – | – | – |
+    | command straight | 0/240 | – | – | – | – | – | – |
+    | speed 0-5 m/s | 40/240 | 1.106 (n = 10) | 0.394 (n = 10) | 3.394 (n = 10) | 0.250 (n = 10) | 0.750 (n = 10) | 2.750 (n = 10) |
+    | speed 5-10 m/s | 80/240 | 0.811 (n = 20) | 0.689 (n = 20) | 10.439 (n = 20) | 0.312 (n = 20) | 1.312 (n = 20) | 7.812 (n = 20) |
+    | speed 10-15 m/s | 80/240 | 0.450 (n = 20) | 1.083 (n = 20) | 19.833 (n = 20) | 1.062 (n = 20) | 2.062 (n = 20) | 14.562 (n = 20) |
+    | speed 15+ m/s | 40/240 | 0.385 (n = 10) | 1.379 (n = 10) | 26.879 (n = 10) | 1.625 (n = 10) | 2.625 (n = 10) | 19.625 (n = 10) |
+    ");
+}
+
+#[test]
+fn plot_draws_what_fits_the_scale_of_the_reference_and_names_what_does_not() {
+    let svg = plot::speed_errors(&report(1.0, 6, 40));
+    // Two policies at three horizons; standing still is off by ten times as much.
+    assert_eq!(svg.matches("<circle").count(), 6);
+    assert_eq!(svg.matches(" off the scale").count(), 1);
+    assert!(svg.contains("stand-still: 11.188 m/s off the scale"), "{svg}");
+    // The error of keeping the speed grows with the horizon, so its points rise.
+    let heights: Vec<f64> = svg
+        .lines()
+        .filter(|line| line.starts_with("<circle"))
+        .map(|line| line.split("cy=\"").nth(1).unwrap().split('"').next().unwrap())
+        .map(|height| height.parse().unwrap())
+        .collect();
+    assert!(heights[3] > heights[4] && heights[4] > heights[5], "{heights:?}");
+}
+
+#[test]
+fn plot_escapes_names_and_survives_a_report_without_numbers() {
+    let mut report = report(1.0, 6, 40);
+    report.policies[0].name = "<a & b>".to_string();
+    assert!(plot::speed_errors(&report).contains("&lt;a &amp; b&gt;"));
+    report.policies.iter_mut().for_each(|policy| policy.metrics.clear());
+    assert!(!plot::speed_errors(&report).contains("NaN"));
+}
+
+#[test]
+fn csv_has_one_row_a_policy_and_empty_fields_for_what_is_missing() {
+    let csv = render::csv(&report(1.0, 6, 40));
+    let rows: Vec<Vec<_>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == 6 + 4 * METRICS.len()));
+    let column = |key: &str| rows[0].iter().position(|head| *head == key).unwrap();
+    let short = |row: &[&str], key: &str| {
+        let fields = row[column(key)..].iter().take(4);
+        fields.map(|field| field.get(..6).unwrap_or(field)).collect::<Vec<_>>().join(",")
+    };
+    let part: Vec<_> = rows[1..]
+        .iter()
+        .map(|row| format!("{}: {} | {}", row[3], short(row, "speed_mae_3s"), short(row, "nll")))
+        .collect();
+    insta::assert_snapshot!(part.join("\n"), @"
+    run_1: 0.7708,0.3536,1.2505,60 | -1.012,-1.018,-1.002,60
+    constant-velocity: 1.6875,1.0625,2.25,60 | ,,,0
+    stand-still: 11.187,5.5625,16.25,60 | ,,,0
+    ");
+}
+
+#[test]
+fn latex_escapes_names() {
+    let latex = render::latex(&report(1.0, 6, 40));
+    let part: Vec<_> = latex.lines().filter(|l| !l.contains("FDE") && !l.contains("ADE")).collect();
+    insta::assert_snapshot!(part[..8].join("\n"), @r#"
+    \begin{tabular}{llrrrr}
+    \toprule
+    Metric & Unit & Frames & run\_1 & constant-velocity & stand-still \\
+    \midrule
+    Steer L1 & – & 240/240 & – & – & $0.250$ {\scriptsize $[0.250, 0.250]$} \\
+    Throttle L1 & – & 240/240 & – & – & $0.500$ {\scriptsize $[0.500, 0.500]$} \\
+    Brake L1 & – & 0/240 & – & – & – \\
+    Speed error 1 s & m/s & 180/240 & $0.438$ {\scriptsize $[0.250, 0.646]$} & $0.562$ {\scriptsize $[0.354, 0.750]$} & $10.062$ {\scriptsize $[4.854, 14.750]$} \\
+    "#);
+}
+
+/// Equal but for the last bit of a number, which the JSON reader may lose.
+fn equal(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+            (a - b).abs() <= 1e-15 * a.abs()
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| equal(a, b))
+        }
+        (Value::Object(a), Value::Object(b)) => {
+            a.keys().eq(b.keys()) && a.values().zip(b.values()).all(|(a, b)| equal(a, b))
+        }
+        _ => a == b,
+    }
+}
+
+fn assert_same(a: &Report, b: &Report) {
+    let json = |report| serde_json::to_value(report).unwrap();
+    assert!(equal(&json(a), &json(b)));
+}
+
+#[test]
+fn json_has_null_for_what_is_missing_and_reads_back_equal() {
+    let report = report(1.0, 6, 40);
+    let text = store::json(&report).unwrap();
+    assert_same(&serde_json::from_str(&text).unwrap(), &report);
+    let json: Value = serde_json::from_str(&text).unwrap();
+    let metrics = &json["policies"][1]["metrics"];
+    insta::assert_snapshot!(
+        serde_json::to_string_pretty(&[&metrics["nll"], &metrics["speed_mae_3s"]]).unwrap(),
+        @r#"
+        [
+          {
+            "frames": 0,
+            "interval": null,
+            "value": null
+          },
+          {
+            "frames": 60,
+            "interval": [
+              1.0625,
+              2.25
+            ],
+            "value": 1.6875
+          }
+        ]
+        "#
+    );
+}
+
+/// Every field of a JSON value as `a.b[].c`; keys that are data are `*`.
+fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(map) => {
+            for (key, value) in map {
+                let key = if METRICS.iter().any(|m| m.key == key) { "*" } else { key };
+                let path = if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
+                fields(value, &path, found);
+            }
+        }
+        Value::Array(items) => {
+            items.iter().for_each(|item| fields(item, &format!("{path}[]"), found))
+        }
+        _ => {
+            found.insert(path.to_string());
+        }
+    }
+}
+
+#[test]
+fn schema_lists_every_field_metric_and_column() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.v1.json");
+    let schema: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+
+    let report = report_of(&errors(1.0, 1, 100), true);
+    let mut found = BTreeSet::new();
+    // Twice: the same report once with and once without optional parts.
+    fields(&serde_json::to_value(&report).unwrap(), "", &mut found);
+    found.retain(|path| {
+        !["policies[].paired", "policies[].metrics.*.interval"].contains(&path.as_str())
+    });
+    found.remove("policies[].slices[].metrics.*.interval");
+    let mut listed = BTreeSet::new();
+    for field in schema["fields"].as_array().unwrap() {
+        assert!(field["meaning"].is_string() && field["type"].is_string(), "{field}");
+        listed.insert(field["path"].as_str().unwrap().to_string());
+    }
+    listed.remove("policies[].slices[].metrics.*.interval");
+    assert_eq!(found, listed);
+
+    let in_code: Vec<Value> = METRICS
+        .iter()
+        .map(|m| {
+            serde_json::json!({
+                "key": m.key, "title": m.title, "unit": m.unit, "better": m.better.text(),
+                "definition": m.definition,
+            })
+        })
+        .collect();
+    assert_eq!(schema["metrics"].as_array().unwrap(), &in_code);
+
+    let directory = tempfile::tempdir().unwrap();
+    store::write(directory.path(), &report, &errors(1.0, 1, 100)).unwrap();
+    let columns: Vec<&str> = schema["errors_columns"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["name"].as_str().unwrap())
+        .collect();
+    let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let written = reader.metadata().file_metadata().schema_descr().columns();
+    assert_eq!(written.iter().map(|c| c.name()).collect::<Vec<_>>(), columns);
+}
+
+#[test]
+fn table_can_be_made_again_from_the_errors_per_frame() {
+    let errors = errors(1.0, 6, 40);
+    let report = report_of(&errors, false);
+    let directory = tempfile::tempdir().unwrap();
+    store::write(directory.path(), &report, &errors).unwrap();
+    let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
+    let at = columns.iter().position(|column| column.name() == "speed_mae_3s").unwrap();
+    let mut sums: BTreeMap<String, (f64, f64, u64)> = BTreeMap::new();
+    for row in reader.get_row_iter(None).unwrap() {
+        let row = row.unwrap();
+        let (sum, squares, count) = sums.entry(row.get_string(0).unwrap().clone()).or_default();
+        if let Ok(error) = row.get_double(at) {
+            *sum += error;
+            *squares += error * error;
+            *count += 1;
+        }
+    }
+    assert_eq!(sums.len(), report.policies.len());
+    for policy in &report.policies {
+        let (sum, squares, count) = sums[&policy.name];
+        let mean = policy.metrics["speed_mae_3s"];
+        assert_eq!(mean.frames, count);
+        assert!((mean.value.unwrap() - sum / count as f64).abs() < 1e-12);
+        let rms = policy.metrics["speed_rmse_3s"].value.unwrap();
+        assert!((rms - (squares / count as f64).sqrt()).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn existing_report_is_kept_and_no_temporary_file_is_left() {
+    let errors = errors(1.0, 1, 60);
+    let report = report_of(&errors, false);
+    let directory = tempfile::tempdir().unwrap();
+    store::write(directory.path(), &report, &errors).unwrap();
+    let mut names: Vec<_> = fs::read_dir(directory.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        ["errors.parquet", "report.json", "speed.svg", "table.csv", "table.md", "table.tex"]
+    );
+    let error = store::write(directory.path(), &report, &errors).unwrap_err();
+    assert!(error.to_string().starts_with("a report is already here: "), "{error}");
+    assert!(error.hint().unwrap().contains("--out"));
+    assert_same(&store::read(directory.path()).unwrap(), &report);
+}
+
+fn pmp_eval(arguments: &[&str], directory: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pmp-eval"));
+    command.args(arguments).current_dir(directory).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn table_merges_reports_of_the_same_frames_and_prints_to_stdout() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, errors: &Errors| {
+        store::write(&directory.path().join(name), &report_of(errors, false), errors).unwrap();
+    };
+    write("a", &errors(1.0, 6, 40));
+    let mut renamed = errors(0.5, 6, 40);
+    renamed.policies[0].name = "run_2".to_string();
+    write("b", &renamed);
+    let output = pmp_eval(&["table", "a", "b", "--format", "csv"], directory.path());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let csv = String::from_utf8(output.stdout).unwrap();
+    let names: Vec<_> = csv.lines().skip(1).map(|row| row.split(',').nth(3).unwrap()).collect();
+    assert_eq!(names, ["run_1", "constant-velocity", "stand-still", "run_2"]);
+    for (format, start) in [("md", "# Offline"), ("tex", "\\begin{tabular}"), ("json", "{\n")] {
+        let output = pmp_eval(&["table", "a", "--format", format], directory.path());
+        assert!(String::from_utf8(output.stdout).unwrap().starts_with(start), "{format}");
+    }
+}
+
+#[test]
+fn table_refuses_what_does_not_belong_together_and_says_which() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, report: &Report, errors: &Errors| {
+        store::write(&directory.path().join(name), report, errors).unwrap();
+    };
+    let of = errors(1.0, 6, 40);
+    write("a", &report_of(&of, false), &of);
+    let fewer = errors(1.0, 6, 39);
+    write("frames", &report_of(&fewer, false), &fewer);
+    let mut elsewhere = report_of(&of, false);
+    elsewhere.dataset.manifest_sha256 = "cd".repeat(32);
+    write("dataset", &elsewhere, &of);
+    let retrained = errors(2.0, 6, 40);
+    write("name", &report_of(&retrained, false), &retrained);
+    for (other, what) in [
+        ("frames", "is over other frames (234 held out by episodes) than a (240 by episodes)"),
+        ("dataset", "of dataset town (cdcdcdcdcdcd) and a is of dataset town (abababababab)"),
+        ("name", "another `run_1` than in a"),
+        ("absent", "no report can be read"),
+    ] {
+        let output = pmp_eval(&["table", "a", other], directory.path());
+        assert_eq!(output.status.code(), Some(1), "{other}");
+        assert!(output.stdout.is_empty(), "{other}");
+        assert!(stderr(&output).contains(what), "{}", stderr(&output));
+        assert!(stderr(&output).contains("hint: "), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn report_of_another_version_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("report.json"), r#"{"version": 9}"#).unwrap();
+    let error = store::read(directory.path()).unwrap_err().to_string();
+    assert!(error.contains("version 9, this build reads version 1"), "{error}");
+}
+
+#[test]
+fn misuse_exits_2_and_help_teaches() {
+    let here = Path::new(".");
+    let output = pmp_eval(&["offline", "--policy", "stand-still", "--out", "x"], here);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--data"), "{}", stderr(&output));
+    let help = String::from_utf8(pmp_eval(&["offline", "--help"], here).stdout).unwrap();
+    for word in ["Examples:", "Exit codes:", "constant-velocity", "report.json"] {
+        assert!(help.contains(word), "{help}");
+    }
+}
+
+#[test]
+fn unknown_policy_fails_with_the_names_that_exist() {
+    let directory = tempfile::tempdir().unwrap();
+    let arguments = ["offline", "--policy", "constant-speed", "--data", "d", "--out", "o"];
+    let output = pmp_eval(&arguments, directory.path());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("constant-velocity"), "{}", stderr(&output));
+    assert!(!directory.path().join("o").exists(), "nothing was written");
+}
