@@ -8,14 +8,14 @@ use std::{
 use clap::{Parser, Subcommand, ValueEnum};
 use pmp::{
     cli::{self, Outcome},
+    dataset::open,
     error::{Error, Result},
     eval::{
         baseline, offline, render,
-        report::{Dataset, Holdout, Report},
+        report::{Dataset, Holdout, HoldoutKind, Report},
         statistics::Bootstrap,
         store, summary,
     },
-    frame::Frame,
     policy::Policy,
 };
 
@@ -77,8 +77,6 @@ Examples:
 
 Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
 
-type Frames = Box<dyn Iterator<Item = Result<(String, Frame)>>>;
-
 /// A baseline of that name, or the policy in that run directory.
 fn open_policy(name: &str) -> Result<Box<dyn Policy>> {
     baseline::baseline(name).ok_or_else(|| Error::Run {
@@ -88,9 +86,23 @@ fn open_policy(name: &str) -> Result<Box<dyn Policy>> {
     })
 }
 
-/// The frames of a dataset that no policy was trained on, and how they were chosen.
-fn open_frames(dataset: &Path) -> Result<(Holdout, Frames)> {
-    Err(Error::Dataset { path: dataset.into(), what: "no reader yet".to_string(), hint: None })
+/// The frames that no policy was trained on, as the report tells of them.
+fn holdout(dataset: &open::Dataset) -> Result<Holdout> {
+    if dataset.val.is_empty() {
+        return Err(Error::Dataset {
+            path: dataset.path.clone(),
+            what: "no frames are held out: the only episode is too short".to_string(),
+            hint: Some("ingest more logs".to_string()),
+        });
+    }
+    let time_block = dataset.holdout.is_time_block;
+    Ok(Holdout {
+        kind: if time_block { HoldoutKind::TimeBlock } else { HoldoutKind::Episodes },
+        how: dataset.holdout.how.clone(),
+        weak: time_block,
+        frames: dataset.val.len() as u64,
+        episodes: dataset.val.episodes as u64,
+    })
 }
 
 fn offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<Outcome> {
@@ -105,12 +117,13 @@ fn offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<
     let missing = ["constant-velocity", "stand-still"].into_iter().filter(|n| !names.contains(n));
     names.extend(missing.collect::<Vec<_>>());
     let mut policies = names.into_iter().map(open_policy).collect::<Result<Vec<_>>>()?;
-    let dataset = Dataset::of(data)?;
-    let (holdout, frames) = open_frames(data)?;
+    let dataset = open::Dataset::open(data)?;
+    let holdout = holdout(&dataset)?;
     let bar = cli::progress(holdout.frames, "frames", "evaluating");
-    let errors = offline::evaluate(&mut policies, frames.inspect(|_| bar.inc(1)))?;
+    let frames = dataset.frames(&dataset.val).inspect(|_| bar.inc(1));
+    let errors = offline::evaluate(&mut policies, frames)?;
     bar.finish_and_clear();
-    let report = summary::summarise(dataset, holdout, &errors, Bootstrap::default());
+    let report = summary::summarise(Dataset::of(data)?, holdout, &errors, Bootstrap::default());
     store::write(out, &report, &errors)?;
     cli::print(&render::markdown(&report))?;
     let all = report.evaluated.frames == report.holdout.frames;

@@ -71,6 +71,9 @@ pub struct Made {
     pub damaged: Vec<(String, String)>,
 }
 
+/// JPEG and its camera, where the log has a calibration.
+type StoredPicture = (Vec<u8>, Option<Camera>);
+
 /// What is known of a drive besides its frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
@@ -305,8 +308,8 @@ impl Drive {
         Ok(Made { frame: Ok(Box::new(frame)), damaged })
     }
 
-    /// The stored picture and its camera; the inner error is a damaged picture.
-    fn image(&self, bytes: &[u8]) -> Result<Result<(Vec<u8>, Option<Camera>), String>> {
+    /// The picture as it is stored; the inner error says what is wrong with the recorded one.
+    fn image(&self, bytes: &[u8]) -> Result<Result<StoredPicture, String>> {
         let Some(topic) = self.mapping.camera.as_ref().and_then(|n| self.recording.topics.get(n))
         else {
             return Ok(Err("no camera".to_string()));

@@ -16,4 +16,5 @@ pub mod manifest;
 pub mod summary;
 pub mod ingest;
 pub mod inspect;
+pub mod open;
 pub mod batch;

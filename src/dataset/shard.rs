@@ -6,6 +6,10 @@
 
 use std::{fs::File, path::Path};
 
+use arrow::{
+    array::{AsArray, RecordBatch},
+    datatypes::UInt32Type,
+};
 use parquet::{
     arrow::{
         ArrowWriter, ProjectionMask,
@@ -141,10 +145,20 @@ impl ShardReader {
         Ok(ShardReader { path: path.to_path_buf(), metadata })
     }
 
-    /// Rows of each row group.
-    pub fn group_rows(&self) -> Vec<usize> {
-        let groups = self.metadata.metadata().row_groups();
-        groups.iter().map(|group| group.num_rows() as usize).collect()
+    /// The grid index of every row, by row group.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parquet`] if the shard is damaged.
+    pub fn ticks(&self) -> Result<Vec<Vec<u32>>> {
+        let groups = 0..self.metadata.metadata().num_row_groups();
+        let column = ProjectionMask::columns(self.metadata.parquet_schema(), ["frame"]);
+        let ticks = |batch: &RecordBatch| {
+            let ticks =
+                batch.column(0).as_primitive_opt::<UInt32Type>().ok_or("`frame` is no u32")?;
+            Ok(ticks.values().to_vec())
+        };
+        groups.map(|group| self.read(group, column.clone(), &ticks)).collect()
     }
 
     /// The frames of a row group, each with its episode.
@@ -153,25 +167,31 @@ impl ShardReader {
     ///
     /// [`Error::Parquet`] or [`Error::Dataset`] if the shard is damaged.
     pub fn frames(&self, group: usize) -> Result<Vec<(String, Frame)>> {
+        self.read(group, ProjectionMask::all(), &columns::to_frames)
+    }
+
+    fn read<T>(
+        &self,
+        group: usize,
+        columns: ProjectionMask,
+        convert: &dyn Fn(&RecordBatch) -> Result<Vec<T>, String>,
+    ) -> Result<Vec<T>> {
         // Opened anew each time: clones of one file share their position, which threads must not.
         let file = File::open(&self.path).map_err(Error::io("open", &self.path))?;
         let reader =
             ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone())
-                .with_projection(ProjectionMask::all())
+                .with_projection(columns)
                 .with_row_groups(vec![group])
                 .with_batch_size(ROWS_PER_GROUP)
                 .build()
                 .map_err(Error::parquet(&self.path))?;
-        let mut frames = Vec::new();
+        let mut rows = Vec::new();
         for batch in reader {
             let batch = batch.map_err(Error::arrow(&self.path))?;
-            let some = columns::to_frames(&batch).map_err(|what| Error::Dataset {
-                path: self.path.clone(),
-                what,
-                hint: None,
-            })?;
-            frames.extend(some);
+            let some = convert(&batch);
+            let path = || self.path.clone();
+            rows.extend(some.map_err(|what| Error::Dataset { path: path(), what, hint: None })?);
         }
-        Ok(frames)
+        Ok(rows)
     }
 }

@@ -1,0 +1,206 @@
+//! A finished dataset, opened: which of its frames train, which judge, and how to get them.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    dataset::{
+        manifest::{LogRecord, Manifest},
+        shard::ShardReader,
+        split::Split,
+    },
+    error::{Error, Result},
+    frame::{FUTURE_STEPS, Frame},
+};
+
+/// Of a lone episode, the last one in so many frames judges.
+const TIME_BLOCK_ONE_IN: u32 = 3;
+
+/// Ticks between the last frame that trains and the first that judges: as long as the future
+/// that a frame knows, so that no label of the one lies within the other.
+const GUARD_TICKS: u32 = FUTURE_STEPS as u32;
+
+/// How the frames that judge were set apart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Holdout {
+    /// One sentence.
+    pub how: String,
+    /// A stretch of an episode that was also trained on: good numbers say little of other drives.
+    pub is_time_block: bool,
+}
+
+/// The rows of one row group that belong to a part, ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupRows {
+    /// Index in [`Dataset::shards`].
+    pub shard: usize,
+    /// Row group in the shard.
+    pub group: usize,
+    /// Rows in the group.
+    pub rows: Vec<u32>,
+}
+
+/// The frames of one side.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    pub groups: Vec<GroupRows>,
+    pub episodes: usize,
+}
+
+impl Part {
+    /// Frames in it.
+    pub fn len(&self) -> usize {
+        self.groups.iter().map(|group| group.rows.len()).sum()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+}
+
+/// A dataset that is whole.
+#[derive(Debug)]
+pub struct Dataset {
+    pub path: PathBuf,
+    pub manifest: Manifest,
+    pub shards: Vec<ShardReader>,
+    pub train: Part,
+    pub val: Part,
+    pub holdout: Holdout,
+}
+
+impl Dataset {
+    /// Open a dataset and set apart the frames that judge.
+    ///
+    /// Episodes are on the side that their record says. Where that leaves a side empty, the
+    /// episode with the smallest id judges; a lone episode is cut in time: its last third judges,
+    /// and the 3 s before it belong to neither side.
+    ///
+    /// # Errors
+    ///
+    /// If the folder is no finished dataset, or a shard is missing or damaged.
+    pub fn open(path: &Path) -> Result<Dataset> {
+        let manifest = Manifest::read(path)?;
+        let sides: Vec<Split> = manifest.logs.iter().map(|log| log.split).collect();
+        let has = |split| sides.contains(&split);
+        let mut dataset = Dataset {
+            path: path.to_path_buf(),
+            manifest,
+            shards: Vec::new(),
+            train: Part::default(),
+            val: Part::default(),
+            holdout: Holdout {
+                how: "episodes, by a hash of their id, 7 : 1".to_string(),
+                is_time_block: false,
+            },
+        };
+        let logs = dataset.manifest.logs.clone();
+        if let [log] = logs.as_slice() {
+            dataset.cut_in_time(log)?;
+        } else {
+            if !(has(Split::Train) && has(Split::Val)) {
+                dataset.holdout.how =
+                    "the episode with the smallest id, since the hash left a side empty".into();
+            }
+            for (index, log) in logs.iter().enumerate() {
+                // Logs are sorted by episode.
+                let side = match has(Split::Train) && has(Split::Val) {
+                    true => log.split,
+                    false if index == 0 => Split::Val,
+                    false => Split::Train,
+                };
+                dataset.add(log, |_| Some(side))?;
+                dataset.part(side).episodes += 1;
+            }
+        }
+        Ok(dataset)
+    }
+
+    /// The frames of a part in order, each with its episode, one row group in memory at a time.
+    pub fn frames<'d>(
+        &'d self,
+        part: &'d Part,
+    ) -> impl Iterator<Item = Result<(String, Frame)>> + 'd {
+        part.groups.iter().flat_map(move |group| {
+            let (frames, error) = match self.group(group) {
+                Ok(frames) => (frames, None),
+                Err(error) => (Vec::new(), Some(Err(error))),
+            };
+            frames.into_iter().map(Ok).chain(error)
+        })
+    }
+
+    /// The frames of one row group that belong to a part.
+    ///
+    /// # Errors
+    ///
+    /// If the shard is damaged.
+    pub fn group(&self, group: &GroupRows) -> Result<Vec<(String, Frame)>> {
+        let frames = self.shards[group.shard].frames(group.group)?;
+        let mut wanted = group.rows.iter().peekable();
+        let mut row = 0;
+        Ok(frames
+            .into_iter()
+            .filter(|_| {
+                let is_wanted = wanted.next_if(|next| **next == row).is_some();
+                row += 1;
+                is_wanted
+            })
+            .collect())
+    }
+
+    fn part(&mut self, side: Split) -> &mut Part {
+        match side {
+            Split::Train => &mut self.train,
+            Split::Val => &mut self.val,
+        }
+    }
+
+    fn cut_in_time(&mut self, log: &LogRecord) -> Result<()> {
+        self.holdout = Holdout {
+            how: format!(
+                "the last third of the only episode, {} s apart from what was trained on",
+                f64::from(GUARD_TICKS) * 0.1
+            ),
+            is_time_block: true,
+        };
+        let mut last_tick = 0;
+        for record in &log.shards {
+            let reader = ShardReader::open(&self.path.join(&record.path))?;
+            last_tick = last_tick.max(reader.ticks()?.into_iter().flatten().max().unwrap_or(0));
+        }
+        let first_val = last_tick + 1 - (last_tick + 1) / TIME_BLOCK_ONE_IN;
+        self.add(log, |tick| match tick {
+            tick if tick >= first_val => Some(Split::Val),
+            tick if tick + GUARD_TICKS < first_val => Some(Split::Train),
+            _ => None,
+        })?;
+        self.train.episodes = 1;
+        self.val.episodes = 1;
+        Ok(())
+    }
+
+    /// Open an episode's shards and deal their rows out by tick.
+    fn add(&mut self, log: &LogRecord, side_of: impl Fn(u32) -> Option<Split>) -> Result<()> {
+        for record in &log.shards {
+            let path = self.path.join(&record.path);
+            if !path.exists() {
+                let what = "a shard that the manifest names is missing".to_string();
+                let hint = Some("copy the dataset again, or ingest the logs again".to_string());
+                return Err(Error::Dataset { path, what, hint });
+            }
+            let reader = ShardReader::open(&path)?;
+            let shard = self.shards.len();
+            for (group, ticks) in reader.ticks()?.into_iter().enumerate() {
+                for side in Split::ALL {
+                    let rows = (0..).zip(&ticks).filter(|(_, tick)| side_of(**tick) == Some(side));
+                    let rows: Vec<u32> = rows.map(|(row, _)| row).collect();
+                    if !rows.is_empty() {
+                        self.part(side).groups.push(GroupRows { shard, group, rows });
+                    }
+                }
+            }
+            self.shards.push(reader);
+        }
+        Ok(())
+    }
+}
