@@ -1,3 +1,4 @@
 //! Logs in, batches out.
 
+pub mod sample;
 pub mod batch;

@@ -1,0 +1,4 @@
+// clippy.toml allows this in test functions; the helpers beside them are tests as well.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+mod samples;
