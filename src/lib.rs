@@ -17,4 +17,5 @@ pub mod projection;
 pub mod frame;
 pub mod policy;
 pub mod dataset;
+pub mod model;
 pub mod cli;

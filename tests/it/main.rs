@@ -2,3 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod samples;
+mod losses;
+mod network;
+mod training;
