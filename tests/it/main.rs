@@ -5,3 +5,4 @@ mod samples;
 mod losses;
 mod network;
 mod training;
+mod train_cli;

@@ -1,7 +1,12 @@
 //! The loop and the run directory: what is promised of a training that is stopped, resumed,
 //! started twice, run on other threads or fed with garbage.
 
-use std::{collections::BTreeMap, fs, path::Path, process::Command};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+};
 
 use candle_core::{Device::Cpu, Tensor};
 use pmp::{
@@ -25,6 +30,8 @@ use rand_chacha::{
 pub(crate) struct Synthetic {
     frames: usize,
     salt: u64,
+    /// Height and width of the pictures.
+    size: [usize; 2],
     /// The step at which the machine is switched off.
     dies_at: Option<u64>,
     /// The step whose labels are broken.
@@ -33,7 +40,7 @@ pub(crate) struct Synthetic {
 
 impl Synthetic {
     pub(crate) fn new(frames: usize) -> Self {
-        Self { frames, salt: 0, dies_at: None, nan_at: None }
+        Self { frames, salt: 0, size: [8, 16], dies_at: None, nan_at: None }
     }
 
     pub(crate) fn batch_of(&self, step: u64) -> Batch {
@@ -44,8 +51,9 @@ impl Synthetic {
         };
         let tensor =
             |values: Vec<f32>, shape: &[usize]| Tensor::from_vec(values, shape, &Cpu).unwrap();
-        let camera = tensor(noise(b * 3 * 8 * 16), &[b, 3, 8, 16]);
-        let ralidar = tensor(noise(b * 4 * 8 * 16), &[b, 4, 8, 16]);
+        let [h, w] = self.size;
+        let camera = tensor(noise(b * 3 * h * w), &[b, 3, h, w]);
+        let ralidar = tensor(noise(b * 4 * h * w), &[b, 4, h, w]);
         let (speed, bend) = (noise(b), noise(b));
         let (mut velocity, mut route, mut action, mut motion) = (vec![], vec![], vec![], vec![]);
         for (&speed, &bend) in speed.iter().zip(&bend) {
@@ -384,16 +392,21 @@ fn weights_do_not_depend_on_the_number_of_rayon_threads() {
     assert_same_files(&outs[0], &outs[2]);
 }
 
-/// Not a test by itself: trains at the sizes of `tiny` and prints the checksum of the weights,
-/// for the test below to run in processes of their own.
+/// One of the ignored tests of this file in a process of its own.
+fn child(test: &str) -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args([&format!("training::{test}"), "--exact", "--ignored", "--nocapture"]);
+    command
+}
+
 #[test]
 #[ignore = "a process of the test below"]
-fn checksum_of_a_short_training() {
+fn checksum_of_a_short_training_at_full_size() {
     let dir = tempfile::tempdir().unwrap();
-    let net = NetConfig { height: 8, width: 16, channels: vec![8, 16], ..NetConfig::tiny() };
-    let cfg = TrainConfig { steps: 3, net, ..TrainConfig::default() };
     let out = dir.path().join("run");
-    run_with(&cfg, &out, false, Synthetic::new(32)).unwrap();
+    let cfg = TrainConfig { steps: 2, ..TrainConfig::default() };
+    let frames = Synthetic { size: [32, 80], ..Synthetic::new(cfg.batch_size) };
+    run_with(&cfg, &out, false, frames).unwrap();
     let manifest = run::manifest(&out).unwrap().unwrap();
     println!("checksum {}", manifest.sha256["weights.safetensors"]);
 }
@@ -401,18 +414,46 @@ fn checksum_of_a_short_training() {
 #[test]
 fn weights_do_not_depend_on_the_thread_variables_of_the_process() {
     let checksum = |rayon: &str, candle: &str| {
-        let child = Command::new(std::env::current_exe().unwrap())
-            .args(["training::checksum_of_a_short_training", "--exact", "--ignored", "--nocapture"])
-            .envs([("RAYON_NUM_THREADS", rayon), ("CANDLE_NUM_THREADS", candle)])
-            .output()
-            .unwrap();
-        let text = String::from_utf8(child.stdout).unwrap();
+        let mut child = child("checksum_of_a_short_training_at_full_size");
+        child.envs([("RAYON_NUM_THREADS", rayon), ("CANDLE_NUM_THREADS", candle)]);
+        let text = String::from_utf8(child.output().unwrap().stdout).unwrap();
         let line = text.lines().find_map(|l| Some(l.split_once("checksum ")?.1.to_string()));
         line.unwrap_or_else(|| panic!("{text}"))
     };
     let one = checksum("1", "1");
     assert_eq!(one, checksum("2", "2"));
-    assert_eq!(one, checksum("4", "1"));
+    assert_eq!(one, checksum("3", "1"));
+}
+
+/// Every step is a checkpoint, so that most of the time goes into writing them.
+fn restless() -> TrainConfig {
+    TrainConfig { steps: 40, save_every: 1, log_every: 1, ..small() }
+}
+
+#[test]
+#[ignore = "a process of the test below"]
+fn training_in_the_working_directory() {
+    run(&restless(), Path::new("run"), true).unwrap();
+}
+
+#[test]
+fn killed_process_resumes_to_the_same_files_wherever_it_was_killed() {
+    let dir = tempfile::tempdir().unwrap();
+    let (whole, killed) = (dir.path().join("whole"), dir.path().join("run"));
+    run(&restless(), &whole, false).unwrap();
+    let step = || run::manifest(&killed).unwrap().map_or(0, |m| m.step);
+    for goal in [1, 7, 13, 22, 31] {
+        let mut child = child("training_in_the_working_directory");
+        let mut child = child.current_dir(&dir).stdout(Stdio::null()).spawn().unwrap();
+        while step() < goal && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!((goal..40).contains(&step()), "it was to die on its way: {}", step());
+    }
+    run(&restless(), &killed, true).unwrap();
+    assert_same_files(&whole, &killed);
 }
 
 #[test]
