@@ -45,6 +45,14 @@ pub enum Error {
     #[error("{key}: {what}")]
     Config { key: String, what: String, hint: Option<String> },
 
+    /// A picture of a frame, or what lies on it, that cannot be used.
+    #[error("picture of frame {frame}: {what}")]
+    Picture { frame: u32, what: String },
+
+    /// A training whose numbers are no numbers any more.
+    #[error("training diverged at step {step}: {term} is not finite")]
+    Diverged { step: u64, term: String },
+
     /// A tensor operation failed: shapes, types or the device.
     #[error(transparent)]
     Tensor(#[from] candle_core::Error),
@@ -119,6 +127,11 @@ impl Error {
                 "the log carries a definition of {schema} that pmp cannot read; \
                  `pmp-ingest inspect LOG` shows which topics use it"
             )),
+            Error::Diverged { .. } => Some(
+                "train anew with a lower `lr` or `clip_norm`; if it diverges at the same step, \
+                 look for wild values in the data with `pmp-stats check`"
+                    .into(),
+            ),
             _ => None,
         }
     }

@@ -17,4 +17,5 @@ pub mod summary;
 pub mod ingest;
 pub mod inspect;
 pub mod open;
+pub mod sample;
 pub mod batch;

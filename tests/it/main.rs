@@ -1,4 +1,12 @@
-//! All integration tests, as one binary: linking it once is what takes the time.
+//! The tests of the whole, in one binary: linking the dependencies once is enough.
+
+// clippy.toml allows this in test functions; the helpers beside them are tests as well.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod evaluation;
 mod evaluation_report;
+mod samples;
+mod losses;
+mod network;
+mod training;
+mod train_cli;

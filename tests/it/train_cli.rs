@@ -1,0 +1,46 @@
+//! `pmp-train` as a process: exit codes and words.
+
+use std::process::{Command, Output};
+
+fn pmp_train(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_pmp-train")).args(args).output().unwrap()
+}
+
+fn stderr(out: &Output) -> String {
+    assert!(out.stdout.is_empty(), "talk does not belong on stdout");
+    String::from_utf8(out.stderr.clone()).unwrap()
+}
+
+#[test]
+fn mistyped_flag_of_pmp_train_exits_2_and_names_the_right_one() {
+    let out = pmp_train(&["--data", "d", "--out", "r", "--resum"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(stderr(&out).contains("'--resume'"));
+}
+
+#[test]
+fn configuration_that_makes_no_sense_is_refused_before_anything_is_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, file) = (dir.path().join("run"), dir.path().join("mine.toml"));
+    let out = out.to_str().unwrap();
+    let done = pmp_train(&["--data", "d", "--out", out, "--steps", "0"]);
+    assert_eq!(done.status.code(), Some(1));
+    assert_eq!(stderr(&done), "error: steps: must be at least 1\n");
+
+    std::fs::write(&file, "leraning_rate = 1\n").unwrap();
+    let file = file.to_str().unwrap();
+    let done = pmp_train(&["--data", "d", "--out", out, "--config", file]);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(stderr(&done).contains("unknown field `leraning_rate`, expected one of `model`"));
+    assert!(!std::path::Path::new(out).exists());
+}
+
+#[test]
+fn help_of_pmp_train_shows_examples_and_exit_codes() {
+    let out = pmp_train(&["--help"]);
+    assert_eq!(out.status.code(), Some(0));
+    let text = String::from_utf8(out.stdout).unwrap();
+    for word in ["Examples:", "--resume --steps 6000", "RUN/config.json", "Exit codes:"] {
+        assert!(text.contains(word), "{text}");
+    }
+}
