@@ -16,5 +16,7 @@ pub mod error;
 pub mod projection;
 pub mod frame;
 pub mod policy;
+pub mod log;
 pub mod dataset;
+pub mod sim;
 pub mod cli;
