@@ -60,7 +60,7 @@ impl Car {
         };
         add(body, self.paint, self.paint, 0.6);
         add(cabin, self.paint, GLASS, 0.3);
-        for (x, y) in [(1.45, 0.8), (1.45, -0.8), (-1.44, 0.8), (-1.44, -0.8)] {
+        for (x, y) in [(1.45, 0.835), (1.45, -0.835), (-1.44, 0.835), (-1.44, -0.835)] {
             add(Shape::block(DVec3::new(x, y, 0.0), [0.32, 0.11], 0.62), TYRE, TYRE, 0.1);
         }
         self.add_lamps(scene);

@@ -1,7 +1,8 @@
 //! The embedded simulator: a world, its sensors, and the recorder that makes logs of it.
 //!
 //! Nothing in a log comes from outside the simulated world. Every random number is drawn from a
-//! stream keyed by (seed, episode, purpose), so the same drive gives the same bytes anywhere.
+//! stream keyed by (seed, episode, purpose), so one build makes the same bytes of the same drive,
+//! however many threads it has.
 
 pub mod noise;
 pub mod road;
