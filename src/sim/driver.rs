@@ -23,7 +23,10 @@ const AIM_S: f64 = 0.8;
 const AIM_MIN_M: f64 = 4.0;
 
 /// Slower than this the steering is left alone: nothing would come of a burst, m/s.
-const BURST_MIN_MPS: f64 = 4.0;
+const BURST_MIN_MPS: f64 = 6.0;
+
+/// A burst never pulls the car aside harder than this, m/s2.
+const BURST_MAX_MPS2: f64 = 2.5;
 
 /// A decision: what the driver wants, and what reaches the car.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,11 +91,13 @@ impl Driver {
         let Some(burst) = &mut self.burst else {
             self.calm_s -= DECISION_S;
             if self.calm_s <= 0.0 && speed_mps > BURST_MIN_MPS && !oncoming {
-                let duration_s = self.noise.uniform(0.6, 1.2);
-                // How far the pulse alone would push the car aside by its end: peak angle times
-                // v^2 / wheelbase, integrated twice over a triangle. The driver fights it.
-                let push_m = self.noise.uniform(0.3, 0.8) * self.noise.pick(&[-1.0, 1.0]);
-                let angle_rad = 4.0 * push_m * WHEELBASE_M / (speed_mps * duration_s).powi(2);
+                let duration_s = self.noise.uniform(0.7, 1.3);
+                let push_m = self.noise.uniform(0.3, 0.7);
+                // By its end the pulse alone would push the car aside by its peak, integrated
+                // twice over a triangle; the driver fights it.
+                let pull_mps2 = (4.0 * push_m / duration_s.powi(2)).min(BURST_MAX_MPS2);
+                let side = self.noise.pick(&[-1.0, 1.0]);
+                let angle_rad = side * pull_mps2 * WHEELBASE_M / speed_mps.powi(2);
                 let peak = angle_rad / STEER_LOCK_RAD;
                 self.burst = Some(Burst { peak, duration_s, age_s: 0.0 });
             }

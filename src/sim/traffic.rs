@@ -56,7 +56,7 @@ impl Traffic {
                 paint: noise.pick(&PAINTS),
             },
             cruise: Cruise::default(),
-            wish_mps: noise.uniform(7.0, 12.0),
+            wish_mps: noise.uniform(8.0, 12.5),
             content_s: noise.uniform(6.0, 15.0),
         });
         let mut oncoming = Vec::new();
@@ -112,7 +112,7 @@ impl Lead {
     fn decide(&mut self, road: &Road, noise: &mut Noise) {
         self.content_s -= DECISION_S;
         if self.content_s <= 0.0 {
-            self.wish_mps = noise.uniform(6.0, 12.0);
+            self.wish_mps = noise.uniform(7.0, 12.5);
             self.content_s = noise.uniform(6.0, 15.0);
         }
         let front_m = self.car.s_m + HALF_LENGTH_M;
