@@ -17,6 +17,10 @@ pub enum Error {
     #[error("cannot {action} {}: {source}", path.display())]
     Io { action: &'static str, path: PathBuf, source: std::io::Error },
 
+    /// An output that is there already; nothing is overwritten without being asked.
+    #[error("will not overwrite {}", path.display())]
+    Exists { path: PathBuf, hint: String },
+
     /// A log file that cannot be used at all.
     #[error("{what} (byte {offset}) in {}", path.display())]
     Log { path: PathBuf, offset: u64, what: String, hint: Option<String> },
@@ -122,7 +126,7 @@ impl Error {
             | Error::Policy { hint, .. }
             | Error::Report { hint, .. }
             | Error::Config { hint, .. } => hint.clone(),
-            Error::Mapping { hint, .. } => Some(hint.clone()),
+            Error::Mapping { hint, .. } | Error::Exists { hint, .. } => Some(hint.clone()),
             Error::Definition { schema, .. } => Some(format!(
                 "the log carries a definition of {schema} that pmp cannot read; \
                  `pmp-ingest inspect LOG` shows which topics use it"

@@ -19,6 +19,7 @@ pub mod frame;
 pub mod log;
 pub mod policy;
 pub mod dataset;
+pub mod sim;
 pub mod model;
 pub mod eval;
 pub mod cli;

@@ -5,6 +5,7 @@ use std::{
     process::ExitCode,
 };
 
+use candle_core::Device;
 use clap::{Parser, Subcommand, ValueEnum};
 use pmp::{
     cli::{self, Outcome},
@@ -16,6 +17,7 @@ use pmp::{
         statistics::Bootstrap,
         store, summary,
     },
+    model::learned::Learned,
     policy::Policy,
 };
 
@@ -79,11 +81,17 @@ Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame wa
 
 /// A baseline of that name, or the policy in that run directory.
 fn open_policy(name: &str) -> Result<Box<dyn Policy>> {
-    baseline::baseline(name).ok_or_else(|| Error::Run {
-        path: name.into(),
-        what: "neither a run directory nor a baseline".to_string(),
-        hint: Some(format!("baselines are {}", baseline::NAMES.join(", "))),
-    })
+    if let Some(baseline) = baseline::baseline(name) {
+        return Ok(baseline);
+    }
+    if !Path::new(name).is_dir() {
+        return Err(Error::Run {
+            path: name.into(),
+            what: "neither a run directory nor a baseline".to_string(),
+            hint: Some(format!("baselines are {}", baseline::NAMES.join(", "))),
+        });
+    }
+    Ok(Box::new(Learned::open(Path::new(name), &Device::Cpu)?))
 }
 
 /// The frames that no policy was trained on, as the report tells of them.

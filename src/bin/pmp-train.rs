@@ -1,11 +1,21 @@
 //! `pmp-train`: a dataset in, a run directory out.
 
-use std::{fs, io::IsTerminal as _, path::Path, path::PathBuf, process::ExitCode};
+use std::{
+    fs,
+    io::IsTerminal as _,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+};
 
 use candle_core::Device;
 use clap::Parser;
 use pmp::{
     cli::{self, Outcome},
+    dataset::{
+        loader::{TrainBatches, ValidationBatches},
+        open::Dataset,
+    },
     error::{Error, Result},
     model::{
         config::{Model, Preset, TrainConfig},
@@ -102,10 +112,18 @@ impl Args {
     }
 }
 
-/// DATA LOADER: the one place where the dataset is opened, for `config.batch_size` frames of
-/// `config.net.input_size()` in the order of `config.seed`.
-fn open_data(path: &Path, _config: &TrainConfig, _device: &Device) -> Result<Data> {
-    Err(Error::Dataset { path: path.into(), what: "no data loader yet".into(), hint: None })
+fn open_data(path: &Path, config: &TrainConfig, device: &Device) -> Result<Data> {
+    let dataset = Arc::new(Dataset::open(path)?);
+    let size = config.net.input_size();
+    let (batch_size, seed) = (config.batch_size, config.seed);
+    let train = TrainBatches::new(dataset.clone(), size, batch_size, seed, device)?;
+    let validation = ValidationBatches::new(dataset.clone(), size, device);
+    Ok(Data {
+        validation_batches: validation.count(),
+        train: Box::new(train),
+        validation: Box::new(validation),
+        identity: dataset.manifest.identity(),
+    })
 }
 
 fn main() -> ExitCode {

@@ -17,5 +17,7 @@ pub mod summary;
 pub mod ingest;
 pub mod inspect;
 pub mod open;
+pub mod order;
 pub mod sample;
 pub mod batch;
+pub mod loader;

@@ -3,6 +3,7 @@
 //! ```text
 //! file -> reader (records, damage) -> schema (definitions) -> cdr (values) -> signals (samples)
 //!           mapping: which topic is which signal        transforms: where each sensor sits
+//! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
 //!
 //! Nothing here knows about frames: it turns bytes into samples with units.
@@ -17,3 +18,6 @@ pub mod transforms;
 pub mod recording;
 pub mod profile;
 pub mod mapping;
+pub mod definitions;
+pub mod encode;
+pub mod writer;

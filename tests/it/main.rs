@@ -10,3 +10,5 @@ mod losses;
 mod network;
 mod training;
 mod train_cli;
+mod encoding;
+mod recording;

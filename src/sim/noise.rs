@@ -1,0 +1,76 @@
+//! Random numbers of the simulator: one stream per purpose, all from the seed of the drive.
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+/// What a stream of random numbers is for. Streams never mix, so a sensor added or left out
+/// changes no other part of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    Road,
+    Scenery,
+    Traffic,
+    Driver,
+    Lidar,
+    Radar,
+    Odometry,
+    Imu,
+    Latency,
+}
+
+/// A stream of random numbers.
+#[derive(Clone, Debug)]
+pub struct Noise(ChaCha8Rng);
+
+impl Noise {
+    /// The stream of `purpose` in episode `episode` of `seed`.
+    pub fn new(seed: u64, episode: u32, purpose: Purpose) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(u64::from(episode) << 8 | purpose as u64);
+        Noise(rng)
+    }
+
+    /// Uniform in [`low`, `high`).
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.random::<f64>()
+    }
+
+    /// True with probability `p`.
+    pub fn chance(&mut self, p: f64) -> bool {
+        self.0.random::<f64>() < p
+    }
+
+    /// Normal with mean zero (Box-Muller).
+    pub fn normal(&mut self, std: f64) -> f64 {
+        // 1 - u lies in (0, 1], where the logarithm is finite.
+        let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
+        std * radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()
+    }
+
+    /// One of `choices`, which must not be empty.
+    pub fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.0.random_range(0..choices.len())]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_of_one_seed_differ_and_repeat() {
+        let draw = |episode, purpose| Noise::new(7, episode, purpose).uniform(0.0, 1.0);
+        assert_eq!(draw(0, Purpose::Road), draw(0, Purpose::Road));
+        assert_ne!(draw(0, Purpose::Road), draw(1, Purpose::Road));
+        assert_ne!(draw(0, Purpose::Road), draw(0, Purpose::Imu));
+    }
+
+    #[test]
+    fn normal_has_the_spread_that_was_asked_for() {
+        let mut noise = Noise::new(1, 0, Purpose::Imu);
+        let draws: Vec<f64> = (0..20_000).map(|_| noise.normal(2.0)).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let std = (draws.iter().map(|x| x * x).sum::<f64>() / draws.len() as f64).sqrt();
+        assert!(mean.abs() < 0.06 && (std - 2.0).abs() < 0.06, "mean {mean}, std {std}");
+    }
+}
