@@ -22,6 +22,11 @@ const HORIZON_M: f64 = 70.0;
 const WAIT_S: f64 = 2.0;
 const LINE_GAP_M: f64 = 1.0;
 
+/// Nearer to the line and slower than this, a driver calls it stopped and holds the car.
+const NEAR_LINE_M: f64 = 4.0;
+const CREEP_MPS: f64 = 1.0;
+const HOLD_MPS2: f64 = 1.5;
+
 /// The car in front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ahead {
@@ -50,6 +55,10 @@ impl Cruise {
         dt_s: f64,
     ) -> f64 {
         let line = self.line_ahead(road, front_m, speed_mps, dt_s);
+        if self.waited_s > 0.0 {
+            // The model alone would creep on for seconds.
+            return -HOLD_MPS2;
+        }
         let wish_mps = wish_mps.min(allowed_mps(road, front_m));
         let free = 1.0 - (speed_mps / wish_mps).powi(4);
         let following = [ahead, line].into_iter().flatten();
@@ -70,14 +79,13 @@ impl Cruise {
         if to_line_m > HORIZON_M {
             return None;
         }
-        let waiting = to_line_m < 3.0 * LINE_GAP_M && speed_mps < 0.3;
+        let waiting = to_line_m < NEAR_LINE_M && speed_mps < CREEP_MPS;
         self.waited_s += if waiting { dt_s } else { 0.0 };
         if self.waited_s >= WAIT_S || to_line_m < -1.0 {
             (self.lines_passed, self.waited_s) = (self.lines_passed + 1, 0.0);
             return None;
         }
-        let gap_m = if waiting { 0.1 } else { to_line_m - LINE_GAP_M + REST_GAP_M };
-        Some(Ahead { gap_m, speed_mps: 0.0 })
+        Some(Ahead { gap_m: to_line_m - LINE_GAP_M + REST_GAP_M, speed_mps: 0.0 })
     }
 }
 
