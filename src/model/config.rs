@@ -258,7 +258,6 @@ impl NetConfig {
         need((1..=8).contains(&channels.len()), "net.channels", "must have 1 ... 8 layers")?;
         let sane = channels.iter().all(|c| (1..=1024).contains(c));
         need(sane, "net.channels", "must be in 1 ... 1024")?;
-        // candle's backward pass of a convolution of stride 2 needs even sides.
         let halves = 1 << channels.len();
         for (key, side) in [("net.height", self.height), ("net.width", self.width)] {
             let fits = side > 0 && side <= 4096 && side.is_multiple_of(halves);

@@ -12,6 +12,7 @@
 
 pub mod config;
 pub mod init;
+pub mod conv;
 pub mod pmp;
 pub mod loss;
 pub mod adam;

@@ -16,7 +16,7 @@
 
 use candle_core::{D, Tensor};
 use candle_nn::{
-    Conv2d, Conv2dConfig, Linear, Module, VarBuilder,
+    Linear, Module, VarBuilder,
     init::{NonLinearity, ZERO},
     ops::{sigmoid, softmax},
 };
@@ -25,7 +25,7 @@ use crate::{
     dataset::batch::Inputs,
     error::{Error, Result},
     frame::{FUTURE_STEPS, ROUTE_POINTS},
-    model::{config::NetConfig, init::kaiming},
+    model::{config::NetConfig, conv::conv3x3_stride2, init::kaiming},
 };
 
 /// Speeds of the mixture are in units of this, so that they are of the size of its yaw angles.
@@ -219,20 +219,20 @@ struct Encoder {
     /// `[1, C, 1, 1]`: the input is scaled to (x - mean) / unit.
     mean: Tensor,
     unit: Tensor,
-    convs: Vec<Conv2d>,
+    /// Weight and bias of each.
+    convs: Vec<(Tensor, Tensor)>,
     fc: Dense,
 }
 
 impl Encoder {
     fn new(channels: usize, cfg: &NetConfig, vb: VarBuilder) -> Result<Self> {
-        let stride2 = Conv2dConfig { stride: 2, padding: 1, ..Conv2dConfig::default() };
         let (mut convs, mut c_in) = (vec![], channels);
         for (i, &c_out) in cfg.channels.iter().enumerate() {
             let vb = vb.pp(format!("conv{i}"));
             let start = kaiming(NonLinearity::ReLU);
             let weight = vb.get_with_hints((c_out, c_in, 3, 3), "weight", start)?;
             let bias = vb.get_with_hints(c_out, "bias", ZERO)?;
-            convs.push(Conv2d::new(weight, Some(bias), stride2));
+            convs.push((weight, bias));
             c_in = c_out;
         }
         let halved = |side: usize| side >> cfg.channels.len();
@@ -255,9 +255,10 @@ impl Encoder {
         let scaled = picture.broadcast_sub(&self.mean)?.broadcast_div(&self.unit)?;
         let present = present.reshape(((), 1, 1, 1))?.gt(0.0)?.broadcast_as(scaled.shape())?;
         let mut x = present.where_cond(&scaled, &scaled.zeros_like()?)?;
-        for conv in &self.convs {
-            x = conv.forward(&x)?.relu()?; // [B, C, H/2, W/2]
+        x = x.transpose(0, 1)?; // [C, B, H, W]
+        for (weight, bias) in &self.convs {
+            x = conv3x3_stride2(&x, weight, bias)?.relu()?; // [C, B, H/2, W/2]
         }
-        Ok(self.fc.forward(&x.flatten_from(1)?)?.relu()?)
+        Ok(self.fc.forward(&x.transpose(0, 1)?.flatten_from(1)?)?.relu()?)
     }
 }

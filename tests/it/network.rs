@@ -8,6 +8,7 @@ use pmp::{
     dataset::batch::{Batch, Inputs, Targets},
     model::{
         config::NetConfig,
+        conv::conv3x3_stride2,
         init::Weights,
         loss::{LossSums, LossWeights},
         pmp::Pmp,
@@ -183,6 +184,34 @@ fn start_of_a_parameter_depends_on_the_seed_and_its_name_alone() {
     let variance = start.iter().map(|w| w * w).sum::<f32>() / start.len() as f32;
     assert!((variance / (2.0 / 260.0) - 1.0).abs() < 0.02, "{variance}");
     assert_eq!(values(&nano, 1, "route.fc0.bias"), [0.0; 128]);
+}
+
+#[test]
+fn convolution_and_its_gradients_are_those_of_candle() {
+    let noise = |count: usize, salt: u64| -> Vec<f64> {
+        (0..count as u64)
+            .map(|i| ((i * 7919 + salt * 104_729) % 1009) as f64 / 504.5 - 1.0)
+            .collect()
+    };
+    let var = |shape: &[usize], salt| {
+        Var::from_vec(noise(shape.iter().product(), salt), shape, &Cpu).unwrap()
+    };
+    let (x, weight, bias) = (var(&[2, 3, 6, 10], 1), var(&[5, 3, 3, 3], 2), var(&[5], 3));
+    let theirs = x.conv2d(&weight, 1, 2, 1, 1).unwrap();
+    let theirs = theirs.broadcast_add(&bias.reshape((1, 5, 1, 1)).unwrap()).unwrap();
+    let ours = conv3x3_stride2(&x.transpose(0, 1).unwrap(), &weight, &bias).unwrap();
+    let ours = ours.transpose(0, 1).unwrap();
+    let weighing = Tensor::from_vec(noise(2 * 5 * 3 * 5, 4), (2, 5, 3, 5), &Cpu).unwrap();
+    let all = |out: &Tensor| {
+        let grads = (out * &weighing).unwrap().sum_all().unwrap().backward().unwrap();
+        let of = |v: &Var| grads.get(v.as_tensor()).unwrap().clone();
+        [out.clone(), of(&x), of(&weight), of(&bias)]
+    };
+    for (ours, theirs) in all(&ours).iter().zip(all(&theirs)) {
+        assert_eq!(ours.dims(), theirs.dims());
+        let off = (ours - theirs).unwrap().abs().unwrap().max_all().unwrap();
+        assert!(off.to_scalar::<f64>().unwrap() < 1e-12);
+    }
 }
 
 #[test]
