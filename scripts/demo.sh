@@ -4,17 +4,22 @@
 #   scripts/demo.sh                    on drives that pmp records itself
 #   scripts/demo.sh LOG...             on your own MCAP logs
 #   scripts/demo.sh --out DIR [LOG...] elsewhere than demo/
+#   scripts/demo.sh --steps N [LOG...] a longer training than 300 steps
 #
 # Stopped at any point and started again, it goes on where it was.
 set -euo pipefail
 
-out=""
-if [ "${1:-}" = "--out" ]; then
-    out=${2:?--out needs a folder}
-    mkdir -p "$out"
-    out=$(cd "$out" && pwd)
-    shift 2
-fi
+out="" steps=300
+while [ $# -gt 0 ]; do
+    case $1 in
+    --out) out=${2:?--out needs a folder} && shift 2 ;;
+    --steps) steps=${2:?--steps needs a number} && shift 2 ;;
+    -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0" && exit 0 ;;
+    -*) echo "error: unknown option $1, see --help" >&2 && exit 2 ;;
+    *) break ;;
+    esac
+done
+[ -z "$out" ] || out=$(mkdir -p "$out" && cd "$out" && pwd)
 logs=()
 for log in "$@"; do
     [ -e "$log" ] || { echo "error: no such log: $log" >&2; exit 2; }
@@ -23,7 +28,6 @@ done
 
 cd "$(dirname "$0")/.."
 out=${out:-$PWD/demo}
-steps=${PMP_DEMO_STEPS:-300}
 
 # 3 means done, with something left out that the report names: no reason to stop.
 done_or_with_loss() { "$@" || [ $? -eq 3 ]; }

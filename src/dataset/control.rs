@@ -5,7 +5,7 @@ use crate::{
     frame::RecordedAction,
     log::{
         profile::{DEFAULT_STEERING_LOCK_RAD, Profile},
-        recording::{Series, Stamped, Topic},
+        recording::{Series, Stamped, Topic, nearest},
         signals::{Control, Kind},
     },
 };
@@ -17,6 +17,10 @@ const PEDAL_MPS2: f64 = 0.8;
 /// Mean yaw rate over [`EVIDENCE_NS`] that only steering explains, rad/s.
 const STEERED_RADPS: f64 = 0.05;
 
+/// A difference between wanted and applied control beyond this is a disturbance: more than the
+/// rounding of messages, less than what anybody would disturb by.
+const DISTURBED: f64 = 0.02;
+
 const EVIDENCE_NS: i64 = 2_000_000_000;
 
 /// The controls of a drive.
@@ -24,6 +28,8 @@ const EVIDENCE_NS: i64 = 2_000_000_000;
 pub struct Controls {
     /// Ascending by stamp.
     pub samples: Vec<Stamped<Control>>,
+    /// What moved the car, where the log says that it may differ; ascending by stamp.
+    applied: Vec<Stamped<Control>>,
     /// Front-wheel angle at full steering, rad; used where only wheel angles are known.
     steering_lock_rad: f64,
     recorded: Recorded,
@@ -46,21 +52,20 @@ impl Default for Recorded {
 }
 
 impl Controls {
-    /// Read the controls of a topic.
+    /// Read the controls of a topic; `applied` is the topic of what moved the car instead, where
+    /// the driving was disturbed on purpose.
     ///
     /// A channel that stays at exactly zero while the car does what only that channel can cause
     /// was not recorded: it becomes unknown, so that nobody learns never to brake from a log
     /// without a brake signal.
-    pub fn new(topic: Option<&Topic>, profile: &Profile, track: &EgoTrack) -> Controls {
+    pub fn new(
+        topic: Option<&Topic>,
+        applied: Option<&Topic>,
+        profile: &Profile,
+        track: &EgoTrack,
+    ) -> Controls {
         let Some(topic) = topic else { return Controls::default() };
-        let samples: Vec<Stamped<Control>> = match &topic.series {
-            Series::Control(samples) => samples.clone(),
-            Series::Status(samples) => samples
-                .iter()
-                .map(|sample| Stamped { stamp_ns: sample.stamp_ns, value: sample.value.control })
-                .collect(),
-            _ => Vec::new(),
-        };
+        let samples = samples_of(topic);
         let mut notes = Vec::new();
         let steering_lock_rad = profile.control.steering_lock_rad.unwrap_or_else(|| {
             if topic.kind == Kind::Ackermann {
@@ -95,7 +100,19 @@ impl Controls {
             ),
             brake: unrecorded("brake", frozen(|c| c.brake), evidence.slows_down, "slows down"),
         };
-        Controls { samples, steering_lock_rad, recorded, notes }
+        let applied = applied.map(samples_of).unwrap_or_default();
+        Controls { samples, applied, steering_lock_rad, recorded, notes }
+    }
+
+    /// Whether what moved the car at this control's time is not what the driver wanted.
+    pub fn is_perturbed(&self, wanted: Option<&Stamped<Control>>) -> bool {
+        let Some(wanted) = wanted else { return false };
+        let Some(applied) = nearest(&self.applied, wanted.stamp_ns) else { return false };
+        let channels: [fn(&Control) -> Option<f64>; 3] = [|c| c.steer, |c| c.throttle, |c| c.brake];
+        channels.iter().any(|channel| match (channel(&wanted.value), channel(&applied.value)) {
+            (Some(wanted), Some(applied)) => (wanted - applied).abs() > DISTURBED,
+            _ => false,
+        })
     }
 
     /// A control as the frame stores it.
@@ -111,6 +128,17 @@ impl Controls {
             throttle: channel(control.throttle, self.recorded.throttle, 0.0),
             brake: channel(control.brake, self.recorded.brake, 0.0),
         }
+    }
+}
+
+fn samples_of(topic: &Topic) -> Vec<Stamped<Control>> {
+    match &topic.series {
+        Series::Control(samples) => samples.clone(),
+        Series::Status(samples) => samples
+            .iter()
+            .map(|sample| Stamped { stamp_ns: sample.stamp_ns, value: sample.value.control })
+            .collect(),
+        _ => Vec::new(),
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
     error::Result,
     frame::{Conditions, Frame, Route, Skew},
     log::{
-        cdr,
+        APPLIED_CONTROL, CONDITIONS_RECORD, cdr,
         mapping::{Mapping, PoseSource},
         profile::Profile,
         reader::Place,
@@ -28,9 +28,6 @@ use crate::{
     },
     projection::{Camera, Crop},
 };
-
-/// Name of the metadata record that tells the conditions of a drive.
-pub const CONDITIONS_RECORD: &str = "pmp.conditions";
 
 /// A log, ready to give frames.
 #[derive(Debug)]
@@ -110,7 +107,9 @@ impl Drive {
         let mut notes = mapping.notes.clone();
         let mut left_out = Vec::new();
         notes.extend(track.notes.iter().cloned());
-        let controls = Controls::new(topic(&mapping.control), profile, &track);
+        let applied = recording.log.metadata.get(CONDITIONS_RECORD);
+        let applied = applied.and_then(|record| record.get(APPLIED_CONTROL)).cloned();
+        let controls = Controls::new(topic(&mapping.control), topic(&applied), profile, &track);
         notes.extend(controls.notes.iter().cloned());
         let camera = match topic(&mapping.camera_info).map(|topic| &topic.series) {
             Some(Series::CameraInfo(infos)) => {
@@ -303,7 +302,7 @@ impl Drive {
             conditions: self.conditions.clone(),
             in_junction: None,
             speed_limit_mps: None,
-            perturbed: false,
+            perturbed: self.controls.is_perturbed(tick.control.as_ref()),
         };
         Ok(Made { frame: Ok(Box::new(frame)), damaged })
     }

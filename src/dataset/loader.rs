@@ -14,12 +14,13 @@ use rayon::prelude::*;
 use crate::{
     dataset::{
         batch::{Batch, Batches},
-        open::{Dataset, GroupRows},
+        open::{Dataset, GroupRows, Row},
         order::{Order, Position},
         sample::{InputSize, Sample},
         split::Split,
     },
     error::{Error, Result},
+    frame::Frame,
 };
 
 /// Memory for prepared samples, bytes. A dataset that fits is decoded once.
@@ -63,11 +64,15 @@ impl Groups {
             *last_use = self.uses;
             return Ok(samples.clone());
         }
-        let frames = self.dataset.group(&self.groups[group as usize])?;
-        let samples: Vec<Sample> = frames
-            .par_iter()
-            .map(|(_, frame)| Sample::new(frame, self.size))
-            .collect::<Result<_>>()?;
+        let rows = &self.groups[group as usize];
+        let frames = self.dataset.group(rows)?;
+        let sample = |(row, (_, frame)): (&Row, &(String, Frame))| {
+            let mut sample = Sample::new(frame, self.size)?;
+            sample.motion_len = sample.motion_len.min(usize::from(row.undisturbed_steps));
+            Ok(sample)
+        };
+        let samples: Vec<Sample> =
+            rows.rows.par_iter().zip(&frames).map(sample).collect::<Result<_>>()?;
         if self.cache.len() >= self.cache_groups {
             let oldest = self.cache.iter().min_by_key(|(_, (last_use, _))| *last_use);
             if let Some(oldest) = oldest.map(|(group, _)| *group) {

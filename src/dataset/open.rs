@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{
     dataset::{
         manifest::{LogRecord, Manifest},
-        shard::ShardReader,
+        shard::{RowTick, ShardReader},
         split::Split,
     },
     error::{Error, Result},
@@ -28,15 +28,24 @@ pub struct Holdout {
     pub is_time_block: bool,
 }
 
-/// The rows of one row group that belong to a part, ascending.
+/// Those rows of one row group that belong to a part, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupRows {
     /// Index in [`Dataset::shards`].
     pub shard: usize,
     /// Row group in the shard.
     pub group: usize,
-    /// Rows in the group.
-    pub rows: Vec<u32>,
+    pub rows: Vec<Row>,
+}
+
+/// A row of a row group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Index in the group.
+    pub index: u32,
+    /// Steps of future before the driving is disturbed on purpose: what comes after is not what
+    /// the driver wanted.
+    pub undisturbed_steps: u8,
 }
 
 /// The frames of one side.
@@ -141,7 +150,7 @@ impl Dataset {
         Ok(frames
             .into_iter()
             .filter(|_| {
-                let is_wanted = wanted.next_if(|next| **next == row).is_some();
+                let is_wanted = wanted.next_if(|next| next.index == row).is_some();
                 row += 1;
                 is_wanted
             })
@@ -166,7 +175,8 @@ impl Dataset {
         let mut last_tick = 0;
         for record in &log.shards {
             let reader = ShardReader::open(&self.path.join(&record.path))?;
-            last_tick = last_tick.max(reader.ticks()?.into_iter().flatten().max().unwrap_or(0));
+            let last = reader.ticks()?.into_iter().flatten().map(|tick| tick.index).max();
+            last_tick = last_tick.max(last.unwrap_or(0));
         }
         let first_val = last_tick + 1 - (last_tick + 1) / TIME_BLOCK_ONE_IN;
         self.add(log, |tick| match tick {
@@ -181,6 +191,8 @@ impl Dataset {
 
     /// Open an episode's shards and deal their rows out by tick.
     fn add(&mut self, log: &LogRecord, side_of: impl Fn(u32) -> Option<Split>) -> Result<()> {
+        let mut ticks: Vec<Vec<Vec<RowTick>>> = Vec::new();
+        let first_shard = self.shards.len();
         for record in &log.shards {
             let path = self.path.join(&record.path);
             if !path.exists() {
@@ -189,18 +201,33 @@ impl Dataset {
                 return Err(Error::Dataset { path, what, hint });
             }
             let reader = ShardReader::open(&path)?;
-            let shard = self.shards.len();
-            for (group, ticks) in reader.ticks()?.into_iter().enumerate() {
+            ticks.push(reader.ticks()?);
+            self.shards.push(reader);
+        }
+        let all = ticks.iter().flatten().flatten();
+        let perturbed: Vec<u32> = all.filter(|tick| tick.perturbed).map(|t| t.index).collect();
+        for (shard, groups) in (first_shard..).zip(&ticks) {
+            for (group, ticks) in groups.iter().enumerate() {
                 for side in Split::ALL {
-                    let rows = (0..).zip(&ticks).filter(|(_, tick)| side_of(**tick) == Some(side));
-                    let rows: Vec<u32> = rows.map(|(row, _)| row).collect();
+                    let rows = (0..).zip(ticks).filter(|(_, t)| side_of(t.index) == Some(side));
+                    let rows = rows.map(|(index, tick)| Row {
+                        index,
+                        undisturbed_steps: steps_until(&perturbed, tick.index),
+                    });
+                    let rows: Vec<Row> = rows.collect();
                     if !rows.is_empty() {
                         self.part(side).groups.push(GroupRows { shard, group, rows });
                     }
                 }
             }
-            self.shards.push(reader);
         }
         Ok(())
     }
+}
+
+/// Steps from a tick to the first of the disturbed ones (ascending), at most a whole future.
+fn steps_until(perturbed: &[u32], tick: u32) -> u8 {
+    let next = perturbed.partition_point(|index| *index < tick);
+    let steps = perturbed.get(next).map_or(GUARD_TICKS, |index| index - tick);
+    steps.min(GUARD_TICKS) as u8
 }

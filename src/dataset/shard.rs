@@ -115,6 +115,21 @@ fn properties() -> WriterProperties {
     properties.build()
 }
 
+/// Where on the grid a row is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RowTick {
+    pub index: u32,
+    pub perturbed: bool,
+}
+
+fn row_ticks(batch: &RecordBatch) -> Result<Vec<RowTick>, String> {
+    let index = batch.column_by_name("frame").and_then(|c| c.as_primitive_opt::<UInt32Type>());
+    let perturbed = batch.column_by_name("perturbed").and_then(|c| c.as_boolean_opt());
+    let (index, perturbed) = index.zip(perturbed).ok_or("`frame` or `perturbed` is missing")?;
+    let rows = index.values().iter().zip(perturbed.values());
+    Ok(rows.map(|(index, perturbed)| RowTick { index: *index, perturbed }).collect())
+}
+
 /// A shard to read from.
 #[derive(Debug)]
 pub struct ShardReader {
@@ -145,20 +160,16 @@ impl ShardReader {
         Ok(ShardReader { path: path.to_path_buf(), metadata })
     }
 
-    /// The grid index of every row, by row group.
+    /// Where on the grid every row is, by row group.
     ///
     /// # Errors
     ///
     /// [`Error::Parquet`] if the shard is damaged.
-    pub fn ticks(&self) -> Result<Vec<Vec<u32>>> {
+    pub fn ticks(&self) -> Result<Vec<Vec<RowTick>>> {
         let groups = 0..self.metadata.metadata().num_row_groups();
-        let column = ProjectionMask::columns(self.metadata.parquet_schema(), ["frame"]);
-        let ticks = |batch: &RecordBatch| {
-            let ticks =
-                batch.column(0).as_primitive_opt::<UInt32Type>().ok_or("`frame` is no u32")?;
-            Ok(ticks.values().to_vec())
-        };
-        groups.map(|group| self.read(group, column.clone(), &ticks)).collect()
+        let schema = self.metadata.parquet_schema();
+        let columns = ProjectionMask::columns(schema, ["frame", "perturbed"]);
+        groups.map(|group| self.read(group, columns.clone(), &row_ticks)).collect()
     }
 
     /// The frames of a row group, each with its episode.

@@ -8,6 +8,14 @@
 //!
 //! Nothing here knows about frames: it turns bytes into samples with units.
 
+/// Name of the metadata record in which a log tells of its drive: `town`, `weather`,
+/// `illumination` and `traffic` as in [`crate::frame::Conditions`], and [`APPLIED_CONTROL`].
+pub const CONDITIONS_RECORD: &str = "pmp.conditions";
+
+/// Key of [`CONDITIONS_RECORD`]: the topic of the controls that moved the car, where they are not
+/// always those that the driver wanted because steering was disturbed on purpose.
+pub const APPLIED_CONTROL: &str = "applied_control";
+
 pub mod reader;
 pub mod value;
 pub mod schema;

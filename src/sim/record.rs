@@ -16,6 +16,7 @@ use crate::{
     error::{Error, Result},
     frame::Conditions,
     log::{
+        APPLIED_CONTROL, CONDITIONS_RECORD,
         encode::Message,
         writer::{LogOptions, LogWriter},
     },
@@ -27,9 +28,6 @@ use crate::{
         world::World,
     },
 };
-
-/// Name of the metadata record that says what a drive was like.
-pub const CONDITIONS: &str = "pmp.conditions";
 
 /// Stamp of the first step of episode 0; episodes start [`EPISODE_APART_NS`] apart.
 const START_NS: i64 = 1_750_000_000_000_000_000;
@@ -164,7 +162,7 @@ pub fn record(
 ) -> Result<()> {
     check_seconds(drive.seconds)?;
     let mut log = LogWriter::create(path, options)?;
-    log.write_metadata(CONDITIONS, &words(&drive.conditions()))?;
+    log.write_metadata(CONDITIONS_RECORD, &words(&drive.conditions()))?;
     let mut recorder = Recorder::new(drive);
     recorder.send("/tf_static", messages::static_transforms(recorder.stamp_ns), 0);
     let steps = (drive.seconds * STEPS_PER_S as f64).round() as u64;
@@ -193,13 +191,18 @@ fn check_seconds(seconds: f64) -> Result<()> {
     })
 }
 
-/// What the conditions say, as key and value.
+/// What a log tells of its drive, as key and value.
 fn words(conditions: &Conditions) -> BTreeMap<String, String> {
     let Conditions { town, weather, illumination, traffic } = conditions;
-    [("town", town), ("weather", weather), ("illumination", illumination), ("traffic", traffic)]
-        .into_iter()
-        .filter_map(|(key, value)| Some((key.to_owned(), value.clone()?)))
-        .collect()
+    let applied = Some("/vehicle/status".to_owned());
+    let words = [
+        ("town", town),
+        ("weather", weather),
+        ("illumination", illumination),
+        ("traffic", traffic),
+        (APPLIED_CONTROL, &applied),
+    ];
+    words.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value.clone()?))).collect()
 }
 
 /// A message on its way to the recorder.

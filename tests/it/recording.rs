@@ -13,7 +13,7 @@ use pmp::{
         encode::{CompressedImage, Header},
         writer::{ChunkCompression, LogOptions, LogWriter},
     },
-    sim::record::{CONDITIONS, Drive, RecordConfig, record, record_all},
+    sim::record::{Drive, RecordConfig, record, record_all},
 };
 use tempfile::tempdir;
 
@@ -94,7 +94,11 @@ fn log_says_what_the_drive_was_like() {
         .unwrap();
     let bytes = fs::read(&path).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let index = summary.metadata_indexes.iter().find(|index| index.name == CONDITIONS).unwrap();
+    let index = summary
+        .metadata_indexes
+        .iter()
+        .find(|index| index.name == pmp::log::CONDITIONS_RECORD)
+        .unwrap();
     let record = mcap::read::metadata(&bytes, index).unwrap();
     let words: Vec<_> = record.metadata.iter().map(|(k, v)| format!("{k}={v}")).collect();
     assert_eq!(words, ["illumination=daytime", "town=PlainRoad", "traffic=few", "weather=clear"]);
