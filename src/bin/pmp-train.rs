@@ -81,7 +81,7 @@ Examples:
   pmp-train --data data/ --out runs/first --resume --steps 6000
   pmp-train --data data/ --out runs/mine --config mine.toml
 
-mine.toml, to train the camera alone with a wider mixture:
+mine.toml, to do without ralidar and plan with more modes:
   preset = \"tiny\"
   motion_weight = 0.2
   [net]

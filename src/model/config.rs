@@ -42,7 +42,8 @@ pub struct TrainConfig {
     pub model: Model,
     pub preset: Preset,
     /// Optimiser steps, not epochs: comparable across dataset sizes. The direct action drives
-    /// after some 600, the planned motion needs about 3000.
+    /// after some 600, the planned motion needs about 3000. Raised when a run is resumed, they
+    /// stretch the cosine from there on: more training, but not the run that had them all along.
     pub steps: u64,
     /// Frames per step.
     pub batch_size: usize,
@@ -67,7 +68,7 @@ pub struct TrainConfig {
     pub log_every: u64,
     /// Steps between two validations.
     pub eval_every: u64,
-    /// Batches per validation, at most.
+    /// Batches per validation, at most: fewer if there are fewer.
     pub eval_batches: u64,
     /// Steps between two checkpoints.
     pub save_every: u64,
