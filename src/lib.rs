@@ -13,6 +13,7 @@
 //! (`tests/it/architecture.rs` checks that).
 
 pub mod error;
+pub mod atomic;
 pub mod projection;
 pub mod drops;
 pub mod frame;

@@ -19,9 +19,9 @@ use std::{
 use rayon::prelude::*;
 
 use crate::{
+    atomic::{self, UNFINISHED, sha256_of_file},
     dataset::{
         align::Tick,
-        atomic::{self, UNFINISHED},
         drive::Drive,
         manifest::{FailedLog, IngestConfig, LogRecord, Manifest, ShardRecord, write_episodes},
         shard::{ROWS_PER_GROUP, ROWS_PER_SHARD, ShardWriter},
@@ -30,7 +30,6 @@ use crate::{
     drops::Drops,
     error::{Error, Result},
     frame::{FUTURE_STEPS, Frame},
-    log::reader::sha256_of_file,
 };
 
 /// What an ingest tells while it runs.

@@ -22,11 +22,8 @@ use parquet::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    dataset::{
-        atomic::{self, AtomicFile},
-        drive::Calibration,
-        split::Split,
-    },
+    atomic::{self, AtomicFile},
+    dataset::{drive::Calibration, split::Split},
     drops::{Drops, Reason},
     error::{Error, Result},
     frame::Conditions,
@@ -192,7 +189,7 @@ impl Manifest {
         for shard in self.logs.iter().flat_map(|log| &log.shards) {
             hasher.update(shard.sha256.as_bytes());
         }
-        crate::log::reader::hex(&hasher.finalize())[..16].to_string()
+        crate::atomic::hex(&hasher.finalize())[..16].to_string()
     }
 }
 

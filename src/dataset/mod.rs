@@ -8,7 +8,6 @@ pub mod ralidar;
 pub mod picture;
 pub mod align;
 pub mod drive;
-pub mod atomic;
 pub mod columns;
 pub mod shard;
 pub mod split;

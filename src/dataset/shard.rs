@@ -21,10 +21,8 @@ use parquet::{
 };
 
 use crate::{
-    dataset::{
-        atomic::{AtomicFile, Committed},
-        columns::{self, SCHEMA_VERSION, VERSION_KEY},
-    },
+    atomic::{AtomicFile, Committed},
+    dataset::columns::{self, SCHEMA_VERSION, VERSION_KEY},
     error::{Error, Result},
     frame::Frame,
 };

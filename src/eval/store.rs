@@ -1,12 +1,7 @@
 //! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `errors.parquet`, and
 //! `report.json` last, whose presence means that the directory is whole.
 
-use std::{
-    fs,
-    io::Write as _,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fs, path::Path, sync::Arc};
 
 use arrow::{
     array::{
@@ -19,9 +14,9 @@ use parquet::{
     basic::{Compression, ZstdLevel},
     file::properties::WriterProperties,
 };
-use sha2::{Digest as _, Sha256};
 
 use crate::{
+    atomic::{self, AtomicFile},
     error::{Error, Result},
     eval::{
         definitions::{Aggregate, METRICS, Metric},
@@ -45,11 +40,7 @@ impl Dataset {
             hint: Some("make one from logs with `pmp-ingest --out DATASET LOG...`".to_string()),
         })?;
         let name = directory.file_name().map_or("dataset".into(), |name| name.to_string_lossy());
-        let digest = Sha256::digest(&bytes);
-        Ok(Dataset {
-            name: name.into_owned(),
-            manifest_sha256: digest.iter().map(|byte| format!("{byte:02x}")).collect(),
-        })
+        Ok(Dataset { name: name.into_owned(), manifest_sha256: atomic::sha256(&bytes) })
     }
 }
 
@@ -78,7 +69,6 @@ pub fn refuse_existing(directory: &Path) -> Result<()> {
 /// [`Error::Parquet`] or [`Error::Json`] if a file cannot be written.
 pub fn write(directory: &Path, report: &Report, errors: &Errors) -> Result<()> {
     refuse_existing(directory)?;
-    fs::create_dir_all(directory).map_err(Error::io("create", directory))?;
     write_errors(&directory.join("errors.parquet"), errors)?;
     let texts = [
         ("table.md", render::markdown(report)),
@@ -88,7 +78,7 @@ pub fn write(directory: &Path, report: &Report, errors: &Errors) -> Result<()> {
         ("report.json", json(report)?),
     ];
     for (name, text) in texts {
-        replace(&directory.join(name), |file| file.write_all(text.as_bytes()))?;
+        atomic::write(&directory.join(name), text.as_bytes())?;
     }
     Ok(())
 }
@@ -164,26 +154,12 @@ fn write_errors(path: &Path, errors: &Errors) -> Result<()> {
         }
         RecordBatch::try_new(schema.clone(), columns).map_err(Error::arrow(path))
     };
-    let temporary = temporary(path);
-    let file = fs::File::create(&temporary).map_err(Error::io("create", &temporary))?;
+    let file = AtomicFile::create(path)?;
     let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
         .map_err(Error::parquet(path))?;
     for policy in &errors.policies {
         writer.write(&batch(policy)?).map_err(Error::parquet(path))?;
     }
-    writer.close().map_err(Error::parquet(path))?;
-    fs::rename(&temporary, path).map_err(Error::io("rename to", path))
-}
-
-fn replace(path: &Path, fill: impl FnOnce(&mut fs::File) -> std::io::Result<()>) -> Result<()> {
-    let temporary = temporary(path);
-    let mut file = fs::File::create(&temporary).map_err(Error::io("create", &temporary))?;
-    fill(&mut file).map_err(Error::io("write", &temporary))?;
-    fs::rename(&temporary, path).map_err(Error::io("rename to", path))
-}
-
-fn temporary(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_os_string();
-    name.push(".tmp");
-    PathBuf::from(name)
+    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
+    Ok(())
 }

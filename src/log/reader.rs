@@ -15,7 +15,6 @@ use std::{
 };
 
 use mcap::records::{ChunkHeader, Record, op};
-use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
@@ -462,26 +461,4 @@ fn decompress(header: &ChunkHeader, stored: Vec<u8>) -> (Vec<u8>, Option<String>
 
 fn le_u64(bytes: &[u8]) -> u64 {
     bytes.iter().take(8).rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
-}
-
-/// SHA-256 of a whole file, lower-case hexadecimal.
-///
-/// # Errors
-///
-/// [`Error::Io`] if the file cannot be read.
-pub fn sha256_of_file(path: &Path) -> Result<String> {
-    let mut file = File::open(path).map_err(Error::io("open", path))?;
-    let mut hasher = Sha256::new();
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut buffer).map_err(Error::io("read", path))? {
-            0 => return Ok(hex(&hasher.finalize())),
-            len => hasher.update(&buffer[..len]),
-        }
-    }
-}
-
-/// Lower-case hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

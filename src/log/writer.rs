@@ -17,6 +17,7 @@ use mcap::{
 };
 
 use crate::{
+    atomic::unfinished_name,
     error::{Error, Result},
     log::{
         definitions::definition,
@@ -77,9 +78,7 @@ impl LogWriter {
     /// [`Error::Exists`] if `path` exists, [`Error::Io`] if the file cannot be made.
     pub fn create(path: &Path, options: LogOptions) -> Result<Self> {
         refuse_existing(path)?;
-        let mut temporary = path.as_os_str().to_owned();
-        temporary.push(".tmp");
-        let temporary = PathBuf::from(temporary);
+        let temporary = unfinished_name(path);
         let file = File::create(&temporary).map_err(Error::io("create", &temporary))?;
         let mcap = WriteOptions::new()
             .profile("ros2")

@@ -25,9 +25,9 @@ use std::{
 use candle_core::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::{Digest as _, Sha256};
 
 use crate::{
+    atomic::{self, UNFINISHED},
     error::{Error, Result},
     model::config::TrainConfig,
 };
@@ -95,10 +95,10 @@ impl RunDir {
         device: &Device,
     ) -> Result<(Self, Option<Checkpoint>)> {
         let there = names(dir)?;
-        let ours = |name: &String| *name == temporary(CONFIG);
+        let ours = |name: &String| *name == format!("{CONFIG}.{UNFINISHED}");
         if there.iter().all(|name| resume && ours(name)) {
             fs::create_dir_all(dir).map_err(Error::io("create", dir))?;
-            replace(&dir.join(CONFIG), &pretty(&dir.join(CONFIG), config)?)?;
+            atomic::write_json(&dir.join(CONFIG), config)?;
         } else if !resume {
             return Err(Error::Run {
                 path: dir.into(),
@@ -127,7 +127,7 @@ impl RunDir {
         }
         same(&as_read(dir, &saved)?, &as_read(dir, config)?, "")?;
         if more_steps {
-            replace(&dir.join(CONFIG), &pretty(&dir.join(CONFIG), &saved)?)?;
+            atomic::write_json(&dir.join(CONFIG), &saved)?;
         }
         let checkpoint = manifest.map(|m| checkpoint(dir, &m, device)).transpose()?;
         let metrics = cut(&dir.join(METRICS), checkpoint.as_ref().map_or(0, |c| c.step))?;
@@ -166,7 +166,7 @@ impl RunDir {
         self.metrics.sync_all().map_err(Error::io("flush", self.dir.join(METRICS)))?;
         let parent = self.dir.join(CHECKPOINTS);
         let name = format!("step-{step:08}");
-        let (making, made) = (parent.join(temporary(&name)), parent.join(&name));
+        let (making, made) = (parent.join(format!("{name}.{UNFINISHED}")), parent.join(&name));
         for leftover in [&making, &made] {
             remove(leftover)?;
         }
@@ -174,12 +174,12 @@ impl RunDir {
         let mut sha256 = BTreeMap::new();
         for (file, tensors) in [(WEIGHTS, weights), (OPTIMIZER, moments)] {
             let bytes = safetensors::serialize(tensors, None).map_err(candle_core::Error::from)?;
-            sha256.insert(file.into(), digest(&bytes));
-            write(&making.join(file), &bytes)?;
+            let committed = atomic::write(&making.join(file), &bytes)?;
+            sha256.insert(file.into(), committed.sha256);
         }
-        sync_dir(&making)?;
+        atomic::sync_folder(&making)?;
         fs::rename(&making, &made).map_err(Error::io("rename", &making))?;
-        sync_dir(&parent)?;
+        atomic::sync_folder(&parent)?;
         let manifest = Manifest {
             version: VERSION,
             pmp: env!("CARGO_PKG_VERSION").into(),
@@ -188,8 +188,7 @@ impl RunDir {
             checkpoint: format!("{CHECKPOINTS}/{name}"),
             sha256,
         };
-        let path = self.dir.join(MANIFEST);
-        replace(&path, &pretty(&path, &manifest)?)?;
+        atomic::write_json(&self.dir.join(MANIFEST), &manifest)?;
         for old in names(&parent)?.into_iter().filter(|old| *old != name) {
             remove(&parent.join(old))?;
         }
@@ -203,7 +202,7 @@ impl RunDir {
 ///
 /// [`Error::Json`] if it cannot be understood, [`Error::Io`].
 pub fn saved_config(dir: &Path) -> Result<Option<TrainConfig>> {
-    read_json(&dir.join(CONFIG))
+    atomic::read_json_if_exists(&dir.join(CONFIG))
 }
 
 /// The configuration and the weights of the run in a directory.
@@ -229,7 +228,7 @@ pub fn trained(dir: &Path, device: &Device) -> Result<(TrainConfig, HashMap<Stri
 ///
 /// [`Error::Run`] if it is of another version, [`Error::Json`], [`Error::Io`].
 pub fn manifest(dir: &Path) -> Result<Option<Manifest>> {
-    let manifest: Option<Manifest> = read_json(&dir.join(MANIFEST))?;
+    let manifest: Option<Manifest> = atomic::read_json_if_exists(&dir.join(MANIFEST))?;
     match manifest {
         Some(Manifest { version, pmp, .. }) if version != VERSION => Err(Error::Run {
             path: dir.join(MANIFEST),
@@ -254,7 +253,7 @@ fn tensors(
 ) -> Result<HashMap<String, Tensor>> {
     let path = dir.join(&manifest.checkpoint).join(file);
     let bytes = fs::read(&path).map_err(Error::io("read", &path))?;
-    if manifest.sha256.get(file) != Some(&digest(&bytes)) {
+    if manifest.sha256.get(file) != Some(&atomic::sha256(&bytes)) {
         return Err(Error::Run {
             path,
             what: format!("damaged: its checksum is not the one in {MANIFEST}"),
@@ -285,7 +284,8 @@ fn same(saved: &Value, wanted: &Value, key: &str) -> Result<()> {
 /// A configuration as it comes back from a file.
 fn as_read(dir: &Path, config: &TrainConfig) -> Result<Value> {
     let path = dir.join(CONFIG);
-    serde_json::from_slice(&pretty(&path, config)?).map_err(Error::json(&path))
+    let text = serde_json::to_vec(config).map_err(Error::json(&path))?;
+    serde_json::from_slice(&text).map_err(Error::json(&path))
 }
 
 /// Open `metrics.jsonl` for appending, without what comes after a step.
@@ -320,51 +320,9 @@ fn names(dir: &Path) -> Result<Vec<String>> {
     entries.map(name).collect()
 }
 
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    match fs::read(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(Error::io("read", path)(e)),
-        Ok(text) => serde_json::from_slice(&text).map(Some).map_err(Error::json(path)),
-    }
-}
-
-fn pretty(path: &Path, value: &impl Serialize) -> Result<Vec<u8>> {
-    let mut text = serde_json::to_vec_pretty(value).map_err(Error::json(path))?;
-    text.push(b'\n');
-    Ok(text)
-}
-
-fn temporary(name: &str) -> String {
-    format!("{name}.tmp")
-}
-
-/// Write a file under a temporary name, flush it, rename it.
-fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let making = path.with_file_name(temporary(&name));
-    write(&making, bytes)?;
-    fs::rename(&making, path).map_err(Error::io("rename", &making))?;
-    path.parent().map_or(Ok(()), sync_dir)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut file = File::create(path).map_err(Error::io("create", path))?;
-    file.write_all(bytes).map_err(Error::io("write", path))?;
-    file.sync_all().map_err(Error::io("flush", path))
-}
-
-/// Make renames within a directory last.
-fn sync_dir(dir: &Path) -> Result<()> {
-    File::open(dir).and_then(|d| d.sync_all()).map_err(Error::io("flush", dir))
-}
-
 fn remove(dir: &Path) -> Result<()> {
     match fs::remove_dir_all(dir) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("delete", dir)(e)),
         _ => Ok(()),
     }
-}
-
-fn digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

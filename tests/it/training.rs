@@ -243,12 +243,12 @@ fn leftovers_of_a_torn_checkpoint_are_ignored_and_cleared() {
     let dying = Synthetic { dies_at: Some(9), ..Synthetic::new(4) };
     run_with(&small(), &torn, false, dying).unwrap_err();
     // Died while writing, and after the directory was named but before run.json was replaced.
-    for leftover in ["step-00000012.tmp", "step-00000012"] {
+    for leftover in ["step-00000012.unfinished", "step-00000012"] {
         let at = torn.join("checkpoints").join(leftover);
         fs::create_dir(&at).unwrap();
         fs::write(at.join("weights.safetensors"), b"half").unwrap();
     }
-    fs::write(torn.join("run.json.tmp"), b"{").unwrap();
+    fs::write(torn.join("run.json.unfinished"), b"{").unwrap();
     let events = run(&small(), &torn, true).unwrap();
     assert!(matches!(events[0], Event::Started { step: 8, .. }));
     assert_same_files(&whole, &torn);
@@ -444,7 +444,7 @@ fn killed_process_resumes_to_the_same_files_wherever_it_was_killed() {
     let step = || run::manifest(&killed).unwrap().map_or(0, |m| m.step);
     for goal in [1, 6, 11, 16, 21, 26, 31] {
         // Every other one dies while it writes the checkpoint, the others right after.
-        let writing = killed.join(format!("checkpoints/step-{goal:08}.tmp"));
+        let writing = killed.join(format!("checkpoints/step-{goal:08}.unfinished"));
         let mut child = child("training_in_the_working_directory");
         let mut child = child.current_dir(&dir).stdout(Stdio::null()).spawn().unwrap();
         while step() < goal && !(goal % 2 == 0 && writing.exists()) {
