@@ -119,7 +119,7 @@ fn open_data(path: &Path, config: &TrainConfig, device: &Device) -> Result<Data>
     let train = TrainBatches::new(dataset.clone(), size, batch_size, seed, device)?;
     let validation = ValidationBatches::new(dataset.clone(), size, device);
     Ok(Data {
-        validation_batches: validation.count(),
+        validation_batches: validation.count().min(config.eval_batches),
         train: Box::new(train),
         validation: Box::new(validation),
         identity: dataset.manifest.identity(),

@@ -10,5 +10,6 @@ mod losses;
 mod network;
 mod training;
 mod train_cli;
+mod run_schema;
 mod encoding;
 mod recording;

@@ -101,7 +101,16 @@ fn log_says_what_the_drive_was_like() {
         .unwrap();
     let record = mcap::read::metadata(&bytes, index).unwrap();
     let words: Vec<_> = record.metadata.iter().map(|(k, v)| format!("{k}={v}")).collect();
-    assert_eq!(words, ["illumination=daytime", "town=PlainRoad", "traffic=few", "weather=clear"]);
+    assert_eq!(
+        words,
+        [
+            "applied_control=/vehicle/status",
+            "illumination=daytime",
+            "town=PlainRoad",
+            "traffic=few",
+            "weather=clear"
+        ]
+    );
 }
 
 #[test]
@@ -150,7 +159,7 @@ fn log_that_was_never_finished_leaves_nothing_that_looks_whole() {
     log.write("/camera", &picture(), 0).unwrap();
     // What a kill at this moment would leave behind.
     let left = names(folder.path());
-    assert!(left.iter().all(|p| p.extension().unwrap() == "tmp"), "{left:?}");
+    assert!(left.iter().all(|p| p.extension().unwrap() == "unfinished"), "{left:?}");
     assert!(mcap::Summary::read(&fs::read(&left[0]).unwrap()).is_err());
     drop(log);
     assert!(names(folder.path()).is_empty(), "an abandoned log is cleared away");

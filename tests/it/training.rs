@@ -141,7 +141,7 @@ fn run_with(cfg: &TrainConfig, out: &Path, resume: bool, train: Synthetic) -> Re
     Ok(events)
 }
 
-fn run(cfg: &TrainConfig, out: &Path, resume: bool) -> Result<Vec<Event>> {
+pub(crate) fn run(cfg: &TrainConfig, out: &Path, resume: bool) -> Result<Vec<Event>> {
     run_with(cfg, out, resume, Synthetic::new(4))
 }
 
