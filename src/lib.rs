@@ -19,5 +19,6 @@ pub mod frame;
 pub mod log;
 pub mod policy;
 pub mod dataset;
+pub mod stats;
 pub mod eval;
 pub mod cli;

@@ -2,3 +2,4 @@
 
 mod evaluation;
 mod evaluation_report;
+mod stats;
