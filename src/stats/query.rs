@@ -1,13 +1,13 @@
 //! Questions to the shards and to `episodes.parquet`, asked through polars.
 //!
-//! The shards are those of the manifest, so what a killed ingest left behind does not count, and
-//! `split` comes from their hive folders. Only scalar columns and the velocity are read: that a
+//! The shards and their split are those of the manifest: what a killed ingest left behind does
+//! not count, and a dataset may lie below a folder that looks like a hive partition. Only scalar columns and the velocity are read: that a
 //! frame has lidar or radar is known from its skew, which is null exactly where they are. Polars
 //! still looks at the types of all columns, so it has to be built with half floats.
 
 use std::{
     collections::BTreeMap,
-    iter,
+    fs, iter,
     path::{Path, PathBuf},
 };
 
@@ -15,7 +15,8 @@ use polars::{
     io::HiveOptions,
     prelude::{
         DataFrame, DataType, Expr, Field, IntoLazy as _, LazyFrame, PlRefPath, PolarsResult,
-        QuantileMethod, ScanArgsParquet, ScanSources, Schema, col, len, lit, when,
+        QuantileMethod, ScanArgsParquet, ScanSources, Schema, UnionArgs, col, concat, len, lit,
+        when,
     },
 };
 
@@ -101,28 +102,40 @@ pub fn summarise(dataset: &Path) -> Result<Summary> {
 
 /// The columns that are asked about, one row a frame; every value as f64, null where absent.
 fn read_frames(dataset: &Path, manifest: &Manifest) -> Result<LazyFrame> {
-    let shards: Vec<_> = manifest.logs.iter().flat_map(|log| &log.shards).collect();
-    if let Some(shard) = shards.iter().find(|shard| !dataset.join(&shard.path).is_file()) {
-        return Err(broken(&dataset.join(&shard.path), "a shard is missing".to_string()));
+    for shard in manifest.logs.iter().flat_map(|log| &log.shards) {
+        let path = dataset.join(&shard.path);
+        match fs::metadata(&path) {
+            Ok(metadata) if metadata.len() == shard.bytes => (),
+            Ok(_) => return Err(broken(&path, "a shard is not as long as it was".to_string())),
+            Err(error) => return Err(broken(&path, format!("a shard cannot be read ({error})"))),
+        }
     }
     let number = |name: &str| col(name).cast(DataType::Float64);
     let axis = |i: i32| col("velocity").arr().get(lit(i), false).cast(DataType::Float64);
     let speed = (axis(0) * axis(0) + axis(1) * axis(1)).sqrt();
-    let mut columns = vec![col("split"), col("command"), col("route_source")];
+    let mut columns = vec![col("command"), col("route_source")];
     columns.push(col("future_len").eq(lit(FUTURE_STEPS as u32)).alias("full_future"));
     columns.push(speed.alias(VALUES[0]));
     columns.extend(VALUES[1..4].iter().map(|name| number(name)));
     columns.extend(VALUES[4..].iter().map(|name| number(name) / lit(NS_PER_MS)));
-    let paths = shards.iter().map(|shard| dataset.join(&shard.path));
-    let table = match shards.is_empty() {
-        true => Ok(no_frames()),
-        false => scan(paths, HiveOptions::new_enabled())
-            .and_then(|frames| frames.select(columns).collect()),
+    let tables = || -> PolarsResult<DataFrame> {
+        let mut tables = vec![no_frames().lazy()];
+        for split in Split::ALL {
+            let logs = manifest.logs.iter().filter(|log| log.split == split);
+            let shards: Vec<_> = logs.flat_map(|log| &log.shards).collect();
+            if !shards.is_empty() {
+                let mut columns = columns.clone();
+                columns.insert(0, lit(split.name()).alias("split"));
+                let paths = shards.iter().map(|shard| dataset.join(&shard.path));
+                tables.push(scan(paths)?.select(columns));
+            }
+        }
+        concat(tables, UnionArgs::default())?.collect()
     };
-    table.map(DataFrame::lazy).map_err(Error::query(dataset))
+    tables().map(DataFrame::lazy).map_err(Error::query(dataset))
 }
 
-/// The table of a dataset without shards.
+/// The table of no shard at all.
 fn no_frames() -> DataFrame {
     let words = ["split", "command", "route_source"].map(|name| (name, DataType::String));
     let numbers = VALUES.map(|name| (name, DataType::Float64));
@@ -134,23 +147,32 @@ fn no_frames() -> DataFrame {
 }
 
 /// Exactly these files, whatever characters their names have.
-fn scan(
-    paths: impl Iterator<Item = PathBuf>,
-    hive_options: HiveOptions,
-) -> PolarsResult<LazyFrame> {
+fn scan(paths: impl Iterator<Item = PathBuf>) -> PolarsResult<LazyFrame> {
     let paths: Vec<PlRefPath> =
         paths.map(|path| PlRefPath::try_from_path(&path)).collect::<PolarsResult<_>>()?;
-    let args = ScanArgsParquet { hive_options, glob: false, ..Default::default() };
+    let args = ScanArgsParquet {
+        hive_options: HiveOptions::new_disabled(),
+        glob: false,
+        ..Default::default()
+    };
     LazyFrame::scan_parquet_sources(ScanSources::Paths(paths.into()), args)
 }
 
-/// What was answered about some rows: counts, means and quantiles of [`VALUES`].
+/// What was answered about some rows.
 struct Answers {
     frames: u64,
     with_full_future: u64,
-    /// Per value: how many are not null, the mean, and the quantiles of the values (of the
-    /// absolute values for skews).
-    values: BTreeMap<&'static str, (u64, Option<f64>, [Option<f64>; 7])>,
+    /// By the names of [`VALUES`].
+    values: BTreeMap<&'static str, Answer>,
+}
+
+/// What was answered about one column of values.
+struct Answer {
+    /// How many are not null.
+    count: u64,
+    mean: Option<f64>,
+    /// At [`Quantiles::LEVELS`]; of the absolute values for skews.
+    quantiles: [Option<f64>; 7],
 }
 
 impl Answers {
@@ -182,21 +204,22 @@ impl Answers {
                 *quantile = number(&level_name(name, level))?;
             }
             let mean = number(&format!("{name} mean"))?;
-            values.insert(name, (count(&format!("{name} count"))?, mean, quantiles));
+            let count = count(&format!("{name} count"))?;
+            values.insert(name, Answer { count, mean, quantiles });
         }
         let with_full_future = count("full_future")?;
         Ok(Answers { frames: count("frames")?, with_full_future, values })
     }
 
     fn count(&self, name: &str) -> u64 {
-        self.values[name].0
+        self.values[name].count
     }
 
     fn distribution(&self, name: &str) -> Option<Distribution> {
-        let (frames, mean, quantiles) = self.values[name];
-        let values: Vec<f64> = quantiles.into_iter().flatten().collect();
+        let Answer { count, mean, quantiles } = &self.values[name];
+        let values: Vec<f64> = quantiles.iter().flatten().copied().collect();
         let quantiles = Quantiles::new(values.try_into().ok()?);
-        Some(Distribution { frames, mean: mean?, quantiles })
+        Some(Distribution { frames: *count, mean: (*mean)?, quantiles })
     }
 
     fn skew(&self, name: &str) -> Option<Skew> {
@@ -245,8 +268,7 @@ fn groups(dataset: &Path, frames: LazyFrame) -> Result<Groups> {
     if !path.is_file() {
         return Err(broken(&path, "the table of episodes is missing".to_string()));
     }
-    let episodes =
-        scan(iter::once(path.clone()), HiveOptions::new_disabled()).map_err(Error::query(&path))?;
+    let episodes = scan(iter::once(path.clone())).map_err(Error::query(&path))?;
     let listed = |column: &str, names: &[&str]| -> Result<Vec<Group>> {
         let mut counts = count_by(frames.clone(), column, len()).map_err(Error::query(dataset))?;
         let known = names.iter().map(|name| Group {

@@ -156,7 +156,8 @@ fn write_group(f: &mut Formatter, name: &str, groups: &[Group]) -> fmt::Result {
 
 fn write_left_out(f: &mut Formatter, left_out: &LeftOut) -> fmt::Result {
     let ticks = left_out.ticks.iter().map(|(reason, count)| (*count, reason.as_str()));
-    let damage = format!("damaged parts of files, in {} logs", grouped(left_out.damaged_logs));
+    let s = if left_out.damaged_logs == 1 { "" } else { "s" };
+    let damage = format!("damaged parts of files, in {} log{s}", grouped(left_out.damaged_logs));
     let others = [
         (left_out.damaged_parts, damage.as_str()),
         (left_out.undecodable_messages, "messages that could not be decoded"),

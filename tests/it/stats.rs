@@ -54,6 +54,7 @@ fn write(root: &Path, drives: &[Drive], change: impl Fn(&mut Vec<LogRecord>)) ->
             shard.write(&episode, frames).unwrap();
         }
         shard.finish().unwrap();
+        let bytes = fs::metadata(root.join(&path)).unwrap().len();
         let rows = drive.frames.len() as u64;
         LogRecord {
             episode,
@@ -86,7 +87,7 @@ fn write(root: &Path, drives: &[Drive], change: impl Fn(&mut Vec<LogRecord>)) ->
             out_of_order: BTreeMap::new(),
             left_out: Vec::new(),
             notes: Vec::new(),
-            shards: vec![ShardRecord { path, rows, bytes: 0, sha256: format!("{number}") }],
+            shards: vec![ShardRecord { path, rows, bytes, sha256: format!("{number}") }],
         }
     };
     let mut logs: Vec<LogRecord> = drives.iter().enumerate().map(record).collect();
@@ -369,7 +370,7 @@ fn schema_lists_every_field_of_the_json_with_its_meaning() {
 fn command_prints_data_on_stdout_and_nothing_on_stderr() {
     let root = tempfile::tempdir().unwrap();
     // Characters that a glob would understand, and a folder that looks like a partition.
-    let dataset = root.path().join("part=1").join("my [data]*");
+    let dataset = root.path().join("split=val").join("command=left").join("my [data]*");
     write(&dataset, &varied(), |_| ());
     let dataset_text = dataset.to_str().unwrap();
     let screen = pmp_stats(&[dataset_text]);
@@ -402,6 +403,9 @@ fn folder_that_is_no_whole_dataset_exits_1_and_says_what_to_do() {
     let claims_more = Manifest { frames: manifest.frames + 1, ..manifest };
     write_manifest(root.path(), &claims_more);
     refused("the shards hold 8 frames, the manifest says 9");
-    fs::remove_file(root.path().join(&claims_more.logs[2].shards[0].path)).unwrap();
-    refused("a shard is missing");
+    let shard = root.path().join(&claims_more.logs[2].shards[0].path);
+    fs::write(&shard, "PAR1").unwrap();
+    refused("a shard is not as long as it was");
+    fs::remove_file(&shard).unwrap();
+    refused("a shard cannot be read");
 }
