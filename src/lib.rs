@@ -22,5 +22,6 @@ pub mod policy;
 pub mod dataset;
 pub mod sim;
 pub mod model;
+pub mod stats;
 pub mod eval;
 pub mod cli;

@@ -13,3 +13,4 @@ mod train_cli;
 mod run_schema;
 mod encoding;
 mod recording;
+mod stats;

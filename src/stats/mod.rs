@@ -1,0 +1,5 @@
+//! A dataset in numbers: what is in it, what is missing, what was left out.
+
+pub mod summary;
+pub mod query;
+pub mod screen;
