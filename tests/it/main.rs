@@ -2,5 +2,12 @@
 
 mod architecture;
 mod schemas;
+mod definitions;
+mod fixtures;
+mod decoding;
+mod logs;
+mod alignment;
+mod ingest;
+mod real_drive;
 mod evaluation;
 mod evaluation_report;
