@@ -63,6 +63,9 @@ struct Sensor {
     optical_from_camera: Pose,
 }
 
+/// A JPEG and the camera that would have taken it.
+type StoredPicture = (Vec<u8>, Option<Camera>);
+
 /// What became of a tick.
 #[derive(Debug)]
 pub struct Made {
@@ -306,7 +309,7 @@ impl Drive {
     }
 
     /// The stored picture and its camera; the inner error is a damaged picture.
-    fn image(&self, bytes: &[u8]) -> Result<Result<(Vec<u8>, Option<Camera>), String>> {
+    fn image(&self, bytes: &[u8]) -> Result<Result<StoredPicture, String>> {
         let Some(topic) = self.mapping.camera.as_ref().and_then(|n| self.recording.topics.get(n))
         else {
             return Ok(Err("no camera".to_string()));

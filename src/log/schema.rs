@@ -81,10 +81,10 @@ pub fn parse(name: &str, text: &str) -> Result<Schema> {
         } else if let Some(part) = line.strip_prefix("MSG:").filter(|_| after_separator) {
             raw.push((short_name(part.trim()), Vec::new()));
             after_separator = false;
-        } else if let Some(field) = field(line, index + 1).map_err(fail)? {
-            if let Some((_, fields)) = raw.last_mut() {
-                fields.push(field);
-            }
+        } else if let Some(field) = field(line, index + 1).map_err(fail)?
+            && let Some((_, fields)) = raw.last_mut()
+        {
+            fields.push(field);
         }
     }
     let index: BTreeMap<String, usize> =
