@@ -65,6 +65,14 @@ impl Drops {
         drop.first_ns = drop.first_ns.min(stamp_ns);
     }
 
+    /// Count many in a row, of which the first is at `first_ns`.
+    pub fn add_run(&mut self, reason: Reason, first_ns: i64, count: u64) {
+        if count > 0 {
+            self.add(reason, first_ns, None);
+            self.0.entry(reason).and_modify(|drop| drop.count += count - 1);
+        }
+    }
+
     pub fn count(&self, reason: Reason) -> u64 {
         self.0.get(&reason).map_or(0, |drop| drop.count)
     }

@@ -59,11 +59,22 @@ pub fn align(
     let (start_ns, end_ns) = common_span(signals, required)?;
     let near = |samples, stamp_ns, tolerance_ms| within(samples, stamp_ns, nanos(tolerance_ms));
     let mut grid = Grid { ticks: Vec::new(), drops: Drops::default(), start_ns };
-    for index in 0.. {
-        let stamp_ns = start_ns + i64::from(index) * period_ns;
-        if stamp_ns > end_ns {
-            break;
+    let last = (end_ns - start_ns) / period_ns;
+    let mut at = 0;
+    while at <= last {
+        let stamp_ns = start_ns + at * period_ns;
+        // A gap is passed over at once: one wrong stamp may make it years long.
+        let next = next_with(signals.camera, stamp_ns, nanos(tolerance.camera));
+        let next = next.map_or(last + 1, |ns| (ns - start_ns + period_ns - 1) / period_ns);
+        // Nor is there an index for a tick that is 13 years away.
+        let next = if next > i64::from(u32::MAX) { last + 1 } else { next.min(last + 1) };
+        if next > at {
+            grid.drops.add_run(Reason::ImageGap, stamp_ns, (next - at) as u64);
+            at = next;
+            continue;
         }
+        let index = at as u32;
+        at += 1;
         let lidar = near(signals.lidar, stamp_ns, tolerance.lidar);
         let radar = near(signals.radar, stamp_ns, tolerance.radar);
         let control = within(signals.control, stamp_ns, nanos(tolerance.control));
@@ -101,6 +112,12 @@ fn within<T: Clone>(
     nearest(samples, stamp_ns)
         .filter(|sample| sample.stamp_ns.abs_diff(stamp_ns) <= tolerance_ns as u64)
         .cloned()
+}
+
+/// The first instant from `stamp_ns` on that has a sample within the tolerance.
+fn next_with<T>(samples: &[Stamped<T>], stamp_ns: i64, tolerance_ns: i64) -> Option<i64> {
+    let next = samples.partition_point(|sample| sample.stamp_ns < stamp_ns - tolerance_ns);
+    Some(stamp_ns.max(samples.get(next)?.stamp_ns - tolerance_ns))
 }
 
 fn common_span(signals: &Signals, required: &Required) -> Option<(i64, i64)> {

@@ -60,6 +60,9 @@ struct Sensor {
     optical_from_camera: Pose,
 }
 
+/// A JPEG and the camera that would have taken it.
+type StoredPicture = (Vec<u8>, Option<Camera>);
+
 /// What became of a tick.
 #[derive(Debug)]
 pub struct Made {
@@ -67,9 +70,6 @@ pub struct Made {
     /// Sensor samples of this tick that could not be decoded: topic and why.
     pub damaged: Vec<(String, String)>,
 }
-
-/// JPEG and its camera, where the log has a calibration.
-type StoredPicture = (Vec<u8>, Option<Camera>);
 
 /// What is known of a drive besides its frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -127,19 +127,22 @@ pub fn ingest(
     // Either the logs keep all threads busy or the blocks of one log do, never both: a thread
     // that waits for its blocks would start another log and hold both in memory.
     let by_log = jobs.len() >= rayon::current_num_threads();
-    let records: Vec<(PathBuf, Result<LogRecord>)> = if by_log {
-        jobs.par_iter().map(|job| (job.log.clone(), job.run(out, config, 1, on))).collect()
+    let records: Vec<Result<LogRecord>> = if by_log {
+        jobs.par_iter().map(|job| job.run(out, config, 1, on)).collect()
     } else {
         let blocks = 2 * rayon::current_num_threads();
-        jobs.iter().map(|job| (job.log.clone(), job.run(out, config, blocks, on))).collect()
+        jobs.iter().map(|job| job.run(out, config, blocks, on)).collect()
     };
     let mut committed = Vec::new();
-    for (log, record) in records {
+    for (job, record) in jobs.iter().zip(records) {
         match record {
             Ok(record) => committed.push(record),
             // The disk is the same for all logs: what it refuses once is no matter of one log.
-            Err(error @ Error::Io { .. }) if fs::metadata(&log).is_ok() => return Err(error),
-            Err(error) => fail(&log, error),
+            Err(error @ Error::Io { .. }) if fs::metadata(&job.log).is_ok() => return Err(error),
+            Err(error) => {
+                job.discard(out)?;
+                fail(&job.log, error);
+            }
         }
     }
     if committed.is_empty() {
@@ -220,6 +223,20 @@ impl Job {
         };
         atomic::write_json(&record_path, &record)?;
         Ok(record)
+    }
+
+    /// Remove what a failed log had written: readers of the folder find committed frames only.
+    fn discard(&self, out: &Path) -> Result<()> {
+        let split = Split::of(&self.episode).name();
+        let folder = out.join("frames").join(format!("split={split}"));
+        let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
+        for entry in entries {
+            let path = entry.map_err(Error::io("read", &folder))?.path();
+            if file_name(&path).starts_with(&format!("{}-", self.episode)) {
+                fs::remove_file(&path).map_err(Error::io("remove", &path))?;
+            }
+        }
+        Ok(())
     }
 
     fn write_shards(

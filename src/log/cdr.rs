@@ -19,6 +19,9 @@ const ENCAPSULATION_BYTES: usize = 4;
 /// Most elements of a list of strings or parts in one message: a thousand times a busy radar scan.
 const MAX_LIST_ELEMENTS: usize = 1 << 20;
 
+/// Most parts in one message. A part may take no byte, so that the message's size is no bound.
+const MAX_PARTS: usize = 1 << 20;
+
 /// Decode a whole message.
 ///
 /// # Errors
@@ -51,11 +54,13 @@ struct Cursor<'a> {
     at: usize,
     endian: Endian,
     max_align: usize,
+    parts: usize,
 }
 
 impl<'a> Cursor<'a> {
     fn new(schema: &'a Schema, message: &'a [u8]) -> Result<Self> {
-        let mut cursor = Cursor { schema, data: &[], at: 0, endian: Endian::Little, max_align: 8 };
+        let (endian, max_align) = (Endian::Little, 8);
+        let mut cursor = Cursor { schema, data: &[], at: 0, endian, max_align, parts: 0 };
         let (head, data) = message
             .split_at_checked(ENCAPSULATION_BYTES)
             .ok_or_else(|| cursor.fail("shorter than its encapsulation header"))?;
@@ -82,6 +87,10 @@ impl<'a> Cursor<'a> {
     }
 
     fn structure(&mut self, index: usize) -> Result<Struct<'a>> {
+        self.parts += 1;
+        if self.parts > MAX_PARTS {
+            return Err(self.fail("more parts than a message may have"));
+        }
         let schema = self.schema;
         let definition = &schema.types[index];
         if definition.fields.is_empty() {

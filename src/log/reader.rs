@@ -6,7 +6,7 @@
 //! pictures and clouds that frames need.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     io::{BufReader, Read, Seek, SeekFrom},
     os::unix::fs::FileExt,
@@ -121,7 +121,7 @@ impl Log {
             segments: Vec::new(),
         };
         log.check_magic()?;
-        Walk { schemas: BTreeMap::new(), on_message }.run(&mut log)?;
+        Walk { schemas: BTreeMap::new(), chunks: BTreeSet::new(), on_message }.run(&mut log)?;
         Ok(log)
     }
 
@@ -202,6 +202,8 @@ impl Log {
 /// One pass over the file.
 struct Walk<'f> {
     schemas: BTreeMap<u16, Arc<SchemaRecord>>,
+    /// Where chunks were met, readable or not.
+    chunks: BTreeSet<u64>,
     on_message: &'f mut dyn FnMut(&Message) -> Result<()>,
 }
 
@@ -232,6 +234,7 @@ impl Walk<'_> {
                     Some(next) => {
                         let what = format!("unreadable record; reading goes on at byte {next}");
                         log.damaged(offset, &what);
+                        self.chunks.insert(offset);
                         offset = next;
                         reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
                         continue;
@@ -254,7 +257,10 @@ impl Walk<'_> {
                 _ => reader.seek_relative(len as i64).map_err(Error::io("read", &path))?,
             }
             match opcode {
-                op::CHUNK => self.chunk(log, offset, &body)?,
+                op::CHUNK => {
+                    self.chunks.insert(offset);
+                    self.chunk(log, offset, &body)?;
+                }
                 op::MESSAGE => {
                     let place = log.place_plain(offset, RECORD_HEADER_BYTES + len);
                     self.record(log, opcode, &body, place)?;
@@ -262,11 +268,32 @@ impl Walk<'_> {
                 op::SCHEMA | op::CHANNEL | op::METADATA => {
                     self.record(log, opcode, &body, (0, 0))?;
                 }
-                op::DATA_END | op::FOOTER => return Ok(()),
+                op::DATA_END | op::FOOTER => match self.chunk_not_met(log, offset) {
+                    Some(next) => {
+                        let what = format!("the data ends early; reading goes on at byte {next}");
+                        log.damaged(offset, &what);
+                        offset = next;
+                        reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
+                        continue;
+                    }
+                    None => return Ok(()),
+                },
                 _ => {}
             }
             offset += RECORD_HEADER_BYTES + len;
         }
+    }
+
+    /// At the end of the data: report the chunks that the summary names and that were passed by,
+    /// taken for something else; and the first that lies beyond the end.
+    fn chunk_not_met(&mut self, log: &mut Log, end: u64) -> Option<u64> {
+        let offsets = log.indexed_chunk_offsets();
+        for at in offsets.iter().filter(|at| **at <= end) {
+            if self.chunks.insert(*at) {
+                log.damaged(*at, "the index names a chunk here, and there is none to be read");
+            }
+        }
+        offsets.into_iter().find(|at| *at > end && *at < log.size_bytes)
     }
 
     fn chunk(&mut self, log: &mut Log, offset: u64, body: &[u8]) -> Result<()> {

@@ -108,7 +108,12 @@ pub fn parse(name: &str, text: &str) -> Result<Schema> {
         types.push(StructType { name: type_name, fields });
     }
     let schema = Schema { types };
-    schema.check_depth(name, 0, 0)?;
+    let mut below = vec![None; schema.types.len()];
+    schema.check_depth(0, 0, &mut below).map_err(|what| Error::Definition {
+        schema: name.into(),
+        line: 1,
+        what,
+    })?;
     Ok(schema)
 }
 
@@ -123,15 +128,34 @@ impl Schema {
         })
     }
 
-    fn check_depth(&self, name: &str, at: usize, depth: usize) -> Result<()> {
-        if depth > MAX_DEPTH {
-            let what = format!("type `{}` contains itself", self.types[at].name);
-            return Err(Error::Definition { schema: name.into(), line: 1, what });
+    /// Levels below a type. Each type is walked once, however many ways lead to it: `below` holds
+    /// what is known, and `Some(None)` marks the types on the way down.
+    fn check_depth(
+        &self,
+        at: usize,
+        level: usize,
+        below: &mut [Option<Option<usize>>],
+    ) -> Result<usize, String> {
+        let levels = match below[at] {
+            Some(None) => return Err(format!("type `{}` contains itself", self.types[at].name)),
+            Some(Some(levels)) => levels,
+            None if level > MAX_DEPTH => 0,
+            None => {
+                below[at] = Some(None);
+                let mut levels = 0;
+                for field in &self.types[at].fields {
+                    if let Element::Struct(inner) = field.element {
+                        levels = levels.max(1 + self.check_depth(inner, level + 1, below)?);
+                    }
+                }
+                below[at] = Some(Some(levels));
+                levels
+            }
+        };
+        match level + levels <= MAX_DEPTH {
+            true => Ok(levels),
+            false => Err(format!("type `{}` nests more than {MAX_DEPTH} deep", self.types[0].name)),
         }
-        self.types[at].fields.iter().try_for_each(|field| match field.element {
-            Element::Struct(inner) => self.check_depth(name, inner, depth + 1),
-            _ => Ok(()),
-        })
     }
 }
 

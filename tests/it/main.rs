@@ -3,6 +3,15 @@
 // clippy.toml allows this in test functions; the helpers beside them are tests as well.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod architecture;
+mod schemas;
+mod definitions;
+mod fixtures;
+mod decoding;
+mod logs;
+mod alignment;
+mod ingest;
+mod real_drive;
 mod evaluation;
 mod evaluation_report;
 mod samples;
