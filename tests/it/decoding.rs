@@ -451,7 +451,8 @@ proptest! {
         if let Ok(decoded) = cdr::decode(&schema, &message) {
             prop_assert!(values(&Value::Struct(decoded)) <= 200 + 16 * message.len());
         }
-        prop_assert!(cdr::decode(&schema, &body).is_ok() || body.len() < 400);
+        // Without a head that was made for it: it must only not panic.
+        let _ = cdr::decode(&schema, &body);
     }
 
     #[test]
