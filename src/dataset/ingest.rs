@@ -100,7 +100,9 @@ pub fn ingest(
     let mut failed = Vec::new();
     let mut first_error = None;
     let mut fail = |log: &Path, error: Error| {
-        failed.push(FailedLog { source_log: file_name(log), error: error.to_string() });
+        // The manifest is the same on any machine, wherever its logs lie.
+        let text = error.to_string().replace(&*log.to_string_lossy(), &file_name(log));
+        failed.push(FailedLog { source_log: file_name(log), error: text });
         first_error.get_or_insert(error);
     };
     let mut seen: BTreeMap<String, &PathBuf> = BTreeMap::new();
@@ -109,7 +111,7 @@ pub fn ingest(
             Err(error) => fail(log, error),
             Ok(sha256) => match seen.get(&sha256) {
                 Some(other) => {
-                    let what = format!("the same bytes as {}", other.display());
+                    let what = format!("the same bytes as {}", file_name(other));
                     let (path, hint) = (log.clone(), Some("name each log once".to_string()));
                     fail(log, Error::Log { path, offset: 0, what, hint });
                 }

@@ -414,7 +414,7 @@ fn controls(kind: Kind, samples: &[Control], profile: &Profile, track: &EgoTrack
         undecodable: (0, None),
         out_of_order: 0,
     };
-    Controls::new(Some(&topic), profile, track)
+    Controls::new(Some(&topic), None, profile, track)
 }
 
 fn pedals(steer: f64, throttle: f64, brake: f64) -> Control {

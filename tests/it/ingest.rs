@@ -54,7 +54,7 @@ pub(crate) fn frames(dataset: &Path) -> Vec<(String, Frame)> {
     let mut frames = Vec::new();
     for shard in manifest.logs.iter().flat_map(|log| &log.shards) {
         let reader = ShardReader::open(&dataset.join(&shard.path)).unwrap();
-        for group in 0..reader.group_rows().len() {
+        for group in 0..reader.ticks().unwrap().len() {
             frames.extend(reader.frames(group).unwrap());
         }
     }
