@@ -429,8 +429,7 @@ fn a_log_given_under_two_names_is_used_once_and_told() {
     let dataset = folder.path().join("data");
     let said = into(&dataset, &[&log, &copy]);
     assert_eq!(said.code, 3, "{}", said.err);
-    let expected = format!("b.mcap: failed: the same bytes as {}", log.display());
-    assert!(said.err.contains(&expected), "{}", said.err);
+    assert!(said.err.contains("b.mcap: failed: the same bytes as a.mcap"), "{}", said.err);
     assert_eq!(Manifest::read(&dataset).unwrap().logs.len(), 1);
     // The same name twice is no second log.
     assert_eq!(into(&folder.path().join("once"), &[&log, &log]).code, 0);
