@@ -62,7 +62,7 @@ pub fn thread_pool(jobs: Option<usize>) -> Result<rayon::ThreadPool> {
 ///
 /// # Errors
 ///
-/// [`Error::Io`](crate::error::Error::Io) if stdout cannot be written for another reason.
+/// [`Error::Io`] if stdout cannot be written for another reason.
 pub fn print(text: &str) -> Result<()> {
     use std::io::Write as _;
     match std::io::stdout().lock().write_all(text.as_bytes()) {
