@@ -19,7 +19,7 @@ use crate::{
     error::Result,
     frame::{Conditions, Frame, Route, Skew},
     log::{
-        APPLIED_CONTROL, CONDITIONS_RECORD, cdr,
+        APPLIED_CONTROL, CONDITIONS_RECORD,
         mapping::{Mapping, PoseSource},
         profile::Profile,
         reader::Place,
@@ -267,12 +267,12 @@ impl Drive {
             damaged.push((topic.name.clone(), error.to_string()));
         };
         let lidar = lidar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
-            let cloud = cdr::decode(&topic.schema, bytes);
+            let cloud = topic.decode(bytes);
             let pixels = cloud.and_then(|cloud| lidar_pixels(&cloud, &pose, camera));
             pixels.map_err(|error| keep(topic, error)).ok()
         });
         let radar = radar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
-            let returns = cdr::decode(&topic.schema, bytes);
+            let returns = topic.decode(bytes);
             let pixels = returns.and_then(|r| radar_pixels(topic.kind, &r, &pose, camera));
             pixels.map_err(|error| keep(topic, error)).ok()
         });
@@ -313,7 +313,7 @@ impl Drive {
         else {
             return Ok(Err("no camera".to_string()));
         };
-        let message = cdr::decode(&topic.schema, bytes);
+        let message = topic.decode(bytes);
         let rgb = message
             .and_then(|message| Ok(picture::decode(&signals::picture(topic.kind, &message)?)))
             .unwrap_or_else(|error| Err(error.to_string()));

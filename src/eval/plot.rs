@@ -23,9 +23,12 @@ const RIGHT: f64 = 400.0;
 const TOP: f64 = 40.0;
 const BOTTOM: f64 = 280.0;
 
+/// Lines above the axis.
+const GRID_LINES: f64 = 4.0;
+
 /// Mean absolute speed error at 1, 2 and 3 s with its interval, as SVG.
 ///
-/// The scale holds twice the reference's error, or the best policy's where there is no reference.
+/// The scale holds at least twice the reference's error, or the best policy's where there is no reference.
 /// What lies beyond is not drawn but named, so that standing still does not flatten the rest.
 pub fn speed_errors(report: &Report) -> String {
     let top_mps = scale_mps(report);
@@ -38,8 +41,8 @@ pub fn speed_errors(report: &Report) -> String {
         report.intervals.bootstrap.level * 100.0,
         escaped(&report.dataset.name),
     );
-    for i in 0..=4 {
-        let mps = top_mps * f64::from(i) / 4.0;
+    for i in 0..=GRID_LINES as u32 {
+        let mps = top_mps * f64::from(i) / GRID_LINES;
         let at = y(mps);
         let _ = writeln!(
             svg,
@@ -101,7 +104,14 @@ fn scale_mps(report: &Report) -> f64 {
     let reference = report.policies.iter().find(|policy| policy.name == REFERENCE);
     let best = || report.policies.iter().filter_map(value).reduce(f64::min);
     let enough = reference.and_then(value).or_else(best).unwrap_or_default() * 2.0;
-    if enough > 0.0 { enough } else { 1.0 }
+    if enough > 0.0 { GRID_LINES * round_step(enough / GRID_LINES) } else { 1.0 }
+}
+
+/// The least of 1, 2, 2.5 and 5 times a power of ten that is not below `step`.
+fn round_step(step: f64) -> f64 {
+    let power = 10_f64.powf(step.log10().floor());
+    let factor = [1.0, 2.0, 2.5, 5.0].into_iter().find(|factor| factor * power >= step);
+    factor.unwrap_or(10.0) * power
 }
 
 fn at<'a>(policy: &'a PolicyReport, key: &str) -> Option<(f64, &'a Estimate)> {

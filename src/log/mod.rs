@@ -1,7 +1,7 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> schema (definitions) -> cdr (values) -> signals (samples)
+//! file -> reader (records, damage) -> decoder (schema, cdr: values) -> signals (samples)
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -22,6 +22,7 @@ pub mod schema;
 pub mod cdr;
 pub mod cloud;
 pub mod signals;
+pub mod decoder;
 pub mod transforms;
 pub mod recording;
 pub mod profile;

@@ -11,20 +11,15 @@ use glam::DVec3;
 use crate::{
     error::{Error, Result},
     log::{
-        cdr,
         cloud::Cloud,
+        decoder::Decoder,
         reader::{Channel, Log, Message, Place},
-        schema::{self, Schema},
         signals::{self, CarlaStatus, Control, Header, Kind, Odometry, Pose},
         transforms::TransformTree,
         value::Struct,
     },
     projection::Camera,
 };
-
-/// Encodings of definitions and messages that are read.
-pub const SCHEMA_ENCODINGS: [&str; 1] = ["ros2msg"];
-pub const MESSAGE_ENCODINGS: [&str; 1] = ["cdr"];
 
 /// A sample with its time.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +51,7 @@ pub struct Topic {
     pub name: String,
     pub kind: Kind,
     pub channel: Arc<Channel>,
-    pub schema: Arc<Schema>,
+    pub decoder: Arc<Decoder>,
     pub series: Series,
     /// `frame_id` of the first message.
     pub frame_id: String,
@@ -138,10 +133,10 @@ impl Builder {
 
     fn open(&mut self, channel: &Arc<Channel>) -> Entry {
         match usable(channel) {
-            Ok((kind, schema)) => {
+            Ok((kind, decoder)) => {
                 self.topics
                     .entry(channel.topic.clone())
-                    .or_insert_with(|| Topic::new(kind, channel.clone(), Arc::new(schema)));
+                    .or_insert_with(|| Topic::new(kind, channel.clone(), Arc::new(decoder)));
                 Entry::Used(channel.topic.clone())
             }
             Err(why) => {
@@ -165,22 +160,14 @@ impl Builder {
 }
 
 /// Whether and as what a channel can be read.
-fn usable(channel: &Channel) -> Result<(Kind, Schema), String> {
+fn usable(channel: &Channel) -> Result<(Kind, Decoder), String> {
     let record = channel.schema.as_ref().ok_or("the log has no definition for it")?;
     let kind = Kind::of(&record.name).ok_or("a type that frames do not need")?;
-    if !SCHEMA_ENCODINGS.contains(&record.encoding.as_str()) {
-        return Err(format!("definitions in `{}` are not read", record.encoding));
-    }
-    if !MESSAGE_ENCODINGS.contains(&channel.message_encoding.as_str()) {
-        return Err(format!("messages in `{}` are not read", channel.message_encoding));
-    }
-    let text = std::str::from_utf8(&record.data).map_err(|error| error.to_string())?;
-    let schema = schema::parse(&record.name, text).map_err(|error| error.to_string())?;
-    Ok((kind, schema))
+    Ok((kind, Decoder::of(channel)?))
 }
 
 impl Topic {
-    fn new(kind: Kind, channel: Arc<Channel>, schema: Arc<Schema>) -> Topic {
+    fn new(kind: Kind, channel: Arc<Channel>, decoder: Arc<Decoder>) -> Topic {
         let series = match kind {
             Kind::CompressedImage | Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
             Kind::RadarScan | Kind::RadarTracks => Series::Located(Vec::new()),
@@ -199,7 +186,7 @@ impl Topic {
             name: channel.topic.clone(),
             kind,
             channel,
-            schema,
+            decoder,
             series,
             frame_id: String::new(),
             child_frame_id: None,
@@ -216,21 +203,19 @@ impl Topic {
     ///
     /// [`Error::Decode`] if its bytes do not follow the definition.
     pub fn decode<'a>(&'a self, data: &'a [u8]) -> Result<Struct<'a>> {
-        cdr::decode(&self.schema, data)
+        self.decoder.decode(data)
     }
 
     fn add(&mut self, message: &Message, transforms: &mut TransformTree) -> Result<()> {
-        let schema = self.schema.clone();
+        let decoder = self.decoder.clone();
         if self.kind == Kind::Transforms {
             let is_static = self.name.ends_with("static");
-            for (header, child, pose) in signals::transforms(&cdr::decode(&schema, message.data)?)?
-            {
+            for (header, child, pose) in signals::transforms(&decoder.decode(message.data)?)? {
                 transforms.insert(&header, &child, pose, is_static);
             }
             return Ok(());
         }
-        let first = cdr::decode_first_field(&schema, message.data)?;
-        let header = signals::header_of_first_field(&first)?;
+        let header = decoder.header(message.data)?;
         let is_first = self.series.is_empty();
         if is_first {
             self.describe(message, &header)?;
@@ -239,7 +224,7 @@ impl Topic {
         if self.series.last_stamp().is_some_and(|last| stamp_ns < last) {
             self.out_of_order += 1;
         }
-        let decode = || cdr::decode(&schema, message.data);
+        let decode = || decoder.decode(message.data);
         match &mut self.series {
             Series::Located(samples) => samples.push(Stamped { stamp_ns, value: message.place }),
             Series::CameraInfo(samples) => {
@@ -283,14 +268,14 @@ impl Topic {
     fn describe(&mut self, message: &Message, header: &Header) -> Result<()> {
         self.frame_id = header.frame_id.clone();
         self.uses_log_time = header.stamp_ns == 0;
-        let schema = self.schema.clone();
+        let decoder = self.decoder.clone();
         match self.kind {
             Kind::Odometry => {
-                let message = cdr::decode(&schema, message.data)?;
+                let message = decoder.decode(message.data)?;
                 self.child_frame_id = Some(signals::child_frame(&message)?.to_string());
             }
             Kind::PointCloud => {
-                let message = cdr::decode(&schema, message.data)?;
+                let message = decoder.decode(message.data)?;
                 let fields = Cloud::new(&message)?.fields;
                 self.cloud_fields = fields.into_iter().map(|field| field.name).collect();
             }

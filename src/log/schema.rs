@@ -118,16 +118,6 @@ pub fn parse(name: &str, text: &str) -> Result<Schema> {
 }
 
 impl Schema {
-    /// Whether the message begins with a `std_msgs/Header`.
-    pub fn starts_with_header(&self) -> bool {
-        self.types[0].fields.first().is_some_and(|field| match field.element {
-            Element::Struct(at) => {
-                field.arity == Arity::One && self.types[at].name == "std_msgs/Header"
-            }
-            _ => false,
-        })
-    }
-
     /// Levels below a type. Each type is walked once, however many ways lead to it: `below` holds
     /// what is known, and `Some(None)` marks the types on the way down.
     fn check_depth(

@@ -405,7 +405,7 @@ fn controls(kind: Kind, samples: &[Control], profile: &Profile, track: &EgoTrack
             message_encoding: "cdr".into(),
             schema: None,
         }),
-        schema: Arc::new(Schema { types: Vec::new() }),
+        decoder: Arc::new(Decoder::Cdr(Schema { types: Vec::new() })),
         series: Series::Control(stamped),
         frame_id: String::new(),
         child_frame_id: None,

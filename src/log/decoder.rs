@@ -1,0 +1,65 @@
+//! The decoder of a channel: which encoding its definition and its messages have.
+//!
+//! Everything behind it sees [`Struct`]s and cannot tell encodings apart.
+
+use crate::{
+    error::Result,
+    log::{
+        cdr,
+        reader::Channel,
+        schema::{self, Schema},
+        signals::{self, Header},
+        value::Struct,
+    },
+};
+
+/// Decodes the messages of one channel by the definition that the log carries.
+#[derive(Clone, Debug)]
+pub enum Decoder {
+    /// ROS 2: `ros2msg` definitions, CDR messages.
+    Cdr(Schema),
+}
+
+impl Decoder {
+    /// The decoder of a channel.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: why messages of this channel cannot be decoded.
+    pub fn of(channel: &Channel) -> Result<Decoder, String> {
+        let record = channel.schema.as_ref().ok_or("the log has no definition for it")?;
+        let (definition, message) = (record.encoding.as_str(), channel.message_encoding.as_str());
+        let text = || std::str::from_utf8(&record.data).map_err(|error| error.to_string());
+        match (definition, message) {
+            ("ros2msg", "cdr") => {
+                let schema = schema::parse(&record.name, text()?);
+                Ok(Decoder::Cdr(schema.map_err(|error| error.to_string())?))
+            }
+            _ => Err(format!("`{definition}` definitions of `{message}` messages are not read")),
+        }
+    }
+
+    /// Decode a whole message.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Decode`](crate::error::Error::Decode) if its bytes do not follow the definition.
+    pub fn decode<'a>(&'a self, message: &'a [u8]) -> Result<Struct<'a>> {
+        match self {
+            Decoder::Cdr(schema) => cdr::decode(schema, message),
+        }
+    }
+
+    /// Decode the header of a message alone, where the encoding allows that.
+    ///
+    /// # Errors
+    ///
+    /// As [`decode`](Decoder::decode); also if the message has no header.
+    pub fn header(&self, message: &[u8]) -> Result<Header> {
+        match self {
+            Decoder::Cdr(schema) => {
+                signals::header_of_first_field(&cdr::decode_first_field(schema, message)?)
+            }
+        }
+    }
+}
