@@ -21,6 +21,7 @@ use pmp::{
     frame::{Command, FUTURE_STEPS, ROUTE_POINTS, Route, RouteSource},
     log::{
         cdr,
+        decoder::Decoder,
         profile::{Profile, Required, Tolerance},
         reader::{Channel, Place},
         recording::{Series, Stamped, Topic, nearest},
