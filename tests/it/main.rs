@@ -23,3 +23,4 @@ mod run_schema;
 mod encoding;
 mod recording;
 mod stats;
+mod whole_path;
