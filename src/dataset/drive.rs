@@ -368,7 +368,7 @@ impl Sensor {
         let ego_frame = match &mapping.pose {
             Some(PoseSource::Topic(topic)) => recording.topics[topic].child_frame_id.as_deref(),
             Some(PoseSource::Transform(frame)) => Some(frame.as_str()),
-            None => None,
+            Some(PoseSource::Integrated { .. }) | None => None,
         };
         let optical_axis = ego_frame
             .and_then(|ego| lookup(ego, &camera.frame_id).ok())

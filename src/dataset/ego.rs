@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3, EulerRot};
 
 use crate::{
+    dataset::dead_reckoning::integrate,
     error::Result,
     log::{
         mapping::{Mapping, PoseSource},
@@ -62,11 +63,12 @@ impl EgoTrack {
     /// [`Error::Mapping`](crate::error::Error::Mapping) if the log has no pose.
     pub fn new(recording: &Recording, mapping: &Mapping, tolerance_ns: i64) -> Result<EgoTrack> {
         let Some(source) = &mapping.pose else {
-            let hint = "frames need odometry, a pose topic or /tf of the vehicle; \
+            let hint = "frames need odometry, a pose topic, /tf of the vehicle, or a speed and \
+                        a yaw rate; \
                         `pmp-ingest inspect LOG` shows what the log has";
             return Err(mapping_error(&recording.log, "no ego pose".into(), hint));
         };
-        let poses = poses(recording, source);
+        let poses = poses(recording, source, 2 * tolerance_ns);
         let mut notes = Vec::new();
         let velocities = velocities(recording, mapping, &poses, tolerance_ns, &mut notes);
         let samples = poses
@@ -148,7 +150,7 @@ fn yaw_of(rotation: DQuat) -> f64 {
     rotation.to_euler(EulerRot::ZYX).0
 }
 
-fn poses(recording: &Recording, source: &PoseSource) -> Vec<Stamped<Pose>> {
+fn poses(recording: &Recording, source: &PoseSource, gap_ns: i64) -> Vec<Stamped<Pose>> {
     match source {
         PoseSource::Topic(topic) => match recording.topics.get(topic).map(|topic| &topic.series) {
             Some(Series::Odometry(samples)) => samples
@@ -158,6 +160,10 @@ fn poses(recording: &Recording, source: &PoseSource) -> Vec<Stamped<Pose>> {
             Some(Series::Pose(samples)) => samples.clone(),
             _ => Vec::new(),
         },
+        PoseSource::Integrated { speed, yaw_rate } => {
+            let topics = recording.topics.get(speed).zip(recording.topics.get(yaw_rate));
+            topics.map_or_else(Vec::new, |(speed, rate)| integrate(speed, rate, gap_ns))
+        }
         PoseSource::Transform(frame) => {
             let poses = recording.transforms.track(frame).map(|(_, poses)| poses);
             let mut poses: Vec<_> = poses
@@ -238,6 +244,7 @@ fn world_frame<'r>(recording: &'r Recording, mapping: &'r Mapping) -> Option<&'r
             recording.topics.get(topic).map(|topic| topic.frame_id.as_str())
         }
         PoseSource::Transform(frame) => recording.transforms.track(frame).map(|(parent, _)| parent),
+        PoseSource::Integrated { .. } => None,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Logs in, batches out.
 
+pub mod dead_reckoning;
 pub mod ego;
 pub mod future;
 pub mod route;

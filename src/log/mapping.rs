@@ -4,7 +4,7 @@ use crate::{
     error::Result,
     log::{
         profile::Profile,
-        recording::{Recording, Topic, mapping_error},
+        recording::{Recording, Series, Topic, mapping_error},
         signals::Kind,
     },
 };
@@ -44,6 +44,8 @@ pub enum PoseSource {
     Topic(String),
     /// The transform of this frame in `/tf`.
     Transform(String),
+    /// Integrated from a velocity topic and a yaw rate (an IMU, or the same twist).
+    Integrated { speed: String, yaw_rate: String },
 }
 
 impl Mapping {
@@ -76,9 +78,10 @@ impl Mapping {
 impl Mapping {
     /// What a topic is used as, for people.
     pub fn uses(&self, topic: &str) -> Option<String> {
-        let pose = match &self.pose {
-            Some(PoseSource::Topic(topic)) => Some(topic.clone()),
-            _ => None,
+        let (pose, speed, yaw_rate) = match self.pose.clone() {
+            Some(PoseSource::Topic(topic)) => (Some(topic), None, None),
+            Some(PoseSource::Integrated { speed, yaw_rate }) => (None, Some(speed), Some(yaw_rate)),
+            Some(PoseSource::Transform(_)) | None => (None, None, None),
         };
         let uses = [
             ("camera", &self.camera),
@@ -86,6 +89,8 @@ impl Mapping {
             ("lidar", &self.lidar),
             ("radar", &self.radar),
             ("ego pose", &pose),
+            ("ego pose (speed)", &speed),
+            ("ego pose (yaw rate)", &yaw_rate),
             ("velocity, where the pose has none", &self.velocity),
             ("control", &self.control),
             ("route", &self.route),
@@ -170,8 +175,16 @@ impl Chooser<'_> {
         let frame = frames.into_iter().find(|f| self.recording.transforms.track(f).is_some());
         if let Some(frame) = frame {
             self.notes.push(format!("pose: no odometry, so it is taken from /tf of `{frame}`"));
+            return Ok(Some(PoseSource::Transform(frame.to_string())));
         }
-        Ok(frame.map(|frame| PoseSource::Transform(frame.to_string())))
+        let speed = self.topic("speed", &profile.topics.velocity, &is_velocity, &|_| 0)?;
+        let yaw_rate = self.topic("yaw rate", &None, &is_yaw_rate, &yaw_rate_rank)?;
+        let Some((speed, yaw_rate)) = speed.zip(yaw_rate) else { return Ok(None) };
+        self.notes.push(format!(
+            "pose: none in the log, so it is integrated from {speed} and {yaw_rate}; the world \
+             frame is the car's own"
+        ));
+        Ok(Some(PoseSource::Integrated { speed, yaw_rate }))
     }
 }
 
@@ -218,6 +231,19 @@ fn is_pose(topic: &Topic) -> bool {
 
 fn is_velocity(topic: &Topic) -> bool {
     matches!(topic.kind, Kind::Twist | Kind::CarlaStatus) && !is_command(topic)
+}
+
+/// An IMU, or a twist that turns at all.
+fn is_yaw_rate(topic: &Topic) -> bool {
+    match &topic.series {
+        Series::Imu(_) => true,
+        Series::Twist(samples) => !is_command(topic) && samples.iter().any(|s| s.value.1.z != 0.0),
+        _ => false,
+    }
+}
+
+fn yaw_rate_rank(topic: &Topic) -> u32 {
+    u32::from(topic.kind != Kind::Imu)
 }
 
 fn is_control(topic: &Topic) -> bool {

@@ -141,10 +141,14 @@ fn manifest() -> Manifest {
         notes: vec!["a note".into()],
         shards: vec![ShardRecord { path: "a".into(), rows: 3, bytes: 11, sha256: "00".into() }],
     };
-    let transform = Mapping { pose: Some(PoseSource::Transform("base_link".into())), ..mapping };
+    let transform = PoseSource::Transform("base_link".into());
+    let transform = Mapping { pose: Some(transform), ..mapping.clone() };
+    let integrated = PoseSource::Integrated { speed: "/speed".into(), yaw_rate: "/imu".into() };
+    let integrated = Mapping { pose: Some(integrated), ..mapping };
     let other = LogRecord { episode: "ep-2".into(), mapping: transform, ..log.clone() };
+    let third = LogRecord { episode: "ep-3".into(), mapping: integrated, ..log.clone() };
     let failed = vec![FailedLog { source_log: "b.mcap".into(), error: "why".into() }];
-    Manifest::new(IngestConfig::new(profile, 10.0).unwrap(), vec![log, other], failed)
+    Manifest::new(IngestConfig::new(profile, 10.0).unwrap(), vec![log, other, third], failed)
 }
 
 /// The fields that a schema file lists for a JSON file: path to type.
