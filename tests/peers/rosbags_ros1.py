@@ -55,8 +55,9 @@ def message(name):
 def plain(value):
     """The same as JSON, with the names that ROS 1 gives the parts of a time."""
     if dataclasses.is_dataclass(value):
-        # Constants are fields of the class, too.
+        # Constants are fields of the class, too, and the member that ROS 2 puts into empty types.
         names = [name for name, _ in STORE.fielddefs[value.__msgtype__][1]]
+        names = [name for name in names if name != "structure_needs_at_least_one_member"]
         fields = {name: plain(getattr(value, name)) for name in names}
         if value.__msgtype__ in TIMES:
             fields["nsec"] = fields.pop("nanosec")
