@@ -1,37 +1,27 @@
-//! CDR bytes to values, by the definition that the log carries.
+//! CDR messages to values, by the definition that the log carries.
 //!
 //! OMG DDS-XTypes 1.3 section 7.4 (plain CDR, encoding versions 1 and 2), as ROS 2 middlewares
 //! write it: a 4-byte encapsulation header says byte order and version, and every number is
 //! aligned to its size (at most 8 in version 1, 4 in version 2), counted from behind the header.
 
-use std::borrow::Cow;
-
 use crate::{
     error::{Error, Result},
     log::{
-        schema::{Arity, Element, Field, Schema},
-        value::{Endian, Numbers, Scalar, Struct, Value},
+        schema::Schema,
+        value::{Endian, Struct, Value},
+        wire::{self, Layout},
     },
 };
 
 const ENCAPSULATION_BYTES: usize = 4;
 
-/// Most elements of a list of strings or parts in one message: a thousand times a busy radar scan.
-const MAX_LIST_ELEMENTS: usize = 1 << 20;
-
-/// Most parts in one message. A part may take no byte, so that the message's size is no bound.
-const MAX_PARTS: usize = 1 << 20;
-
 /// Decode a whole message.
 ///
 /// # Errors
 ///
-/// [`Error::Decode`] with the byte: an unknown encapsulation, or a message that is shorter than
-/// its definition needs. Lengths in the message are checked against its size before anything is
-/// allocated for them.
+/// [`Error::Decode`] with the byte: an unknown encapsulation, or as [`wire::decode`].
 pub fn decode<'a>(schema: &'a Schema, message: &'a [u8]) -> Result<Struct<'a>> {
-    let mut cursor = Cursor::new(schema, message)?;
-    cursor.structure(0)
+    wire::decode(layout(schema, message)?, schema, message)
 }
 
 /// Decode the first field of a message alone: its header, where it has one.
@@ -40,151 +30,32 @@ pub fn decode<'a>(schema: &'a Schema, message: &'a [u8]) -> Result<Struct<'a>> {
 ///
 /// As [`decode`]; also if the message type has no fields.
 pub fn decode_first_field<'a>(schema: &'a Schema, message: &'a [u8]) -> Result<Value<'a>> {
-    let mut cursor = Cursor::new(schema, message)?;
-    match schema.types[0].fields.first() {
-        Some(field) => cursor.field(field),
-        None => Err(cursor.fail("the message has no fields")),
-    }
+    wire::decode_first_field(layout(schema, message)?, schema, message)
 }
 
-struct Cursor<'a> {
-    schema: &'a Schema,
-    /// The message behind its encapsulation header.
-    data: &'a [u8],
-    at: usize,
-    endian: Endian,
-    max_align: usize,
-    parts: usize,
-}
-
-impl<'a> Cursor<'a> {
-    fn new(schema: &'a Schema, message: &'a [u8]) -> Result<Self> {
-        let (endian, max_align) = (Endian::Little, 8);
-        let mut cursor = Cursor { schema, data: &[], at: 0, endian, max_align, parts: 0 };
-        let (head, data) = message
-            .split_at_checked(ENCAPSULATION_BYTES)
-            .ok_or_else(|| cursor.fail("shorter than its encapsulation header"))?;
-        cursor.data = data;
-        (cursor.endian, cursor.max_align) = match (head[0], head[1]) {
-            (0, 0) => (Endian::Big, 8),
-            (0, 1) => (Endian::Little, 8),
-            (0, 6) => (Endian::Big, 4),
-            (0, 7) => (Endian::Little, 4),
-            (a, b) => {
-                let what = format!("encapsulation {a:#04x} {b:#04x} is not plain CDR");
-                return Err(cursor.fail(&what));
-            }
-        };
-        Ok(cursor)
-    }
-
-    fn fail(&self, what: &str) -> Error {
-        Error::Decode {
-            schema: self.schema.types[0].name.clone(),
-            offset: ENCAPSULATION_BYTES + self.at,
-            what: what.to_string(),
+/// What the encapsulation header says.
+fn layout(schema: &Schema, message: &[u8]) -> Result<Layout> {
+    let fail = |what: String| Error::Decode {
+        schema: schema.types[0].name.clone(),
+        offset: ENCAPSULATION_BYTES,
+        what,
+    };
+    let (endian, max_align) = match message.first_chunk::<ENCAPSULATION_BYTES>() {
+        None => return Err(fail("shorter than its encapsulation header".to_string())),
+        Some([0, 0, ..]) => (Endian::Big, 8),
+        Some([0, 1, ..]) => (Endian::Little, 8),
+        Some([0, 6, ..]) => (Endian::Big, 4),
+        Some([0, 7, ..]) => (Endian::Little, 4),
+        Some([a, b, ..]) => {
+            return Err(fail(format!("encapsulation {a:#04x} {b:#04x} is not plain CDR")));
         }
-    }
-
-    fn structure(&mut self, index: usize) -> Result<Struct<'a>> {
-        self.parts += 1;
-        if self.parts > MAX_PARTS {
-            return Err(self.fail("more parts than a message may have"));
-        }
-        let schema = self.schema;
-        let definition = &schema.types[index];
-        if definition.fields.is_empty() {
-            // rosidl gives a type without members one byte.
-            self.take(1)?;
-        }
-        let mut fields = Vec::with_capacity(definition.fields.len());
-        for field in &definition.fields {
-            fields.push((field.name.as_str(), self.field(field)?));
-        }
-        Ok(Struct { name: &definition.name, fields })
-    }
-
-    fn field(&mut self, field: &Field) -> Result<Value<'a>> {
-        let count = match field.arity {
-            Arity::One => return self.one(field.element),
-            Arity::Array(count) => count,
-            Arity::Sequence => self.scalar(Scalar::U32)? as usize,
-        };
-        if let Element::Scalar(scalar) = field.element {
-            // An empty sequence is followed by no padding for its elements.
-            if count > 0 {
-                self.align(scalar.size());
-            }
-            let len = count.checked_mul(scalar.size());
-            let bytes = match len {
-                Some(len) => self.take(len)?,
-                None => return Err(self.fail("an array longer than the memory")),
-            };
-            return Ok(Value::Numbers(Numbers { bytes, scalar, endian: self.endian }));
-        }
-        if count > MAX_LIST_ELEMENTS.min(self.data.len().saturating_sub(self.at)) {
-            let what = format!("{count} elements of `{}` in too few bytes", field.name);
-            return Err(self.fail(&what));
-        }
-        (0..count).map(|_| self.one(field.element)).collect::<Result<_>>().map(Value::List)
-    }
-
-    fn one(&mut self, element: Element) -> Result<Value<'a>> {
-        match element {
-            Element::Scalar(scalar @ (Scalar::F32 | Scalar::F64)) => {
-                Ok(Value::Float(self.scalar(scalar)?))
-            }
-            Element::Scalar(scalar @ (Scalar::I64 | Scalar::U64)) => {
-                self.align(scalar.size());
-                let mut raw = [0; 8];
-                raw.copy_from_slice(self.take(8)?);
-                Ok(Value::Int(match self.endian {
-                    Endian::Little => i64::from_le_bytes(raw),
-                    Endian::Big => i64::from_be_bytes(raw),
-                }))
-            }
-            Element::Scalar(scalar) => Ok(Value::Int(self.scalar(scalar)? as i64)),
-            Element::String => {
-                let len = self.scalar(Scalar::U32)? as usize;
-                let bytes = self.take(len)?;
-                let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
-                Ok(Value::Text(String::from_utf8_lossy(text)))
-            }
-            Element::WideString => {
-                let units = self.scalar(Scalar::U32)? as usize;
-                let bytes = match units.checked_mul(2) {
-                    Some(len) => self.take(len)?,
-                    None => return Err(self.fail("a string longer than the memory")),
-                };
-                let numbers = Numbers { bytes, scalar: Scalar::U16, endian: self.endian };
-                let units: Vec<u16> = numbers.iter().map(|unit| unit as u16).collect();
-                Ok(Value::Text(Cow::Owned(String::from_utf16_lossy(&units))))
-            }
-            Element::Struct(index) => self.structure(index).map(Value::Struct),
-        }
-    }
-
-    fn scalar(&mut self, scalar: Scalar) -> Result<f64> {
-        self.align(scalar.size());
-        let bytes = self.take(scalar.size())?;
-        Ok(scalar.read(bytes, self.endian))
-    }
-
-    fn align(&mut self, size: usize) {
-        self.at = self.at.next_multiple_of(size.min(self.max_align));
-    }
-
-    fn take(&mut self, len: usize) -> Result<&'a [u8]> {
-        let bytes = self.at.checked_add(len).and_then(|end| self.data.get(self.at..end));
-        match bytes {
-            Some(bytes) => {
-                self.at += len;
-                Ok(bytes)
-            }
-            None => {
-                let left = self.data.len().saturating_sub(self.at);
-                Err(self.fail(&format!("{len} bytes are needed and {left} are left")))
-            }
-        }
-    }
+    };
+    Ok(Layout {
+        head_bytes: ENCAPSULATION_BYTES,
+        endian,
+        max_align,
+        has_nul: true,
+        // rosidl gives a type without members one byte.
+        empty_type_bytes: 1,
+    })
 }

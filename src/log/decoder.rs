@@ -3,10 +3,11 @@
 //! Everything behind it sees [`Struct`]s and cannot tell encodings apart.
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     log::{
-        cdr,
+        cdr, idl,
         reader::Channel,
+        ros1,
         schema::{self, Schema},
         signals::{self, Header},
         value::Struct,
@@ -16,8 +17,10 @@ use crate::{
 /// Decodes the messages of one channel by the definition that the log carries.
 #[derive(Clone, Debug)]
 pub enum Decoder {
-    /// ROS 2: `ros2msg` definitions, CDR messages.
+    /// ROS 2: `ros2msg` or `ros2idl` definitions, CDR messages.
     Cdr(Schema),
+    /// ROS 1: `ros1msg` definitions, messages in its own serialisation.
+    Ros1(Schema),
 }
 
 impl Decoder {
@@ -30,10 +33,14 @@ impl Decoder {
         let record = channel.schema.as_ref().ok_or("the log has no definition for it")?;
         let (definition, message) = (record.encoding.as_str(), channel.message_encoding.as_str());
         let text = || std::str::from_utf8(&record.data).map_err(|error| error.to_string());
+        let said = |error: Error| error.to_string();
         match (definition, message) {
             ("ros2msg", "cdr") => {
-                let schema = schema::parse(&record.name, text()?);
-                Ok(Decoder::Cdr(schema.map_err(|error| error.to_string())?))
+                schema::parse(&record.name, text()?).map(Decoder::Cdr).map_err(said)
+            }
+            ("ros2idl", "cdr") => idl::parse(&record.name, text()?).map(Decoder::Cdr).map_err(said),
+            ("ros1msg", "ros1") => {
+                schema::parse_ros1(&record.name, text()?).map(Decoder::Ros1).map_err(said)
             }
             _ => Err(format!("`{definition}` definitions of `{message}` messages are not read")),
         }
@@ -43,10 +50,11 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// [`Error::Decode`](crate::error::Error::Decode) if its bytes do not follow the definition.
+    /// [`Error::Decode`] if its bytes do not follow the definition.
     pub fn decode<'a>(&'a self, message: &'a [u8]) -> Result<Struct<'a>> {
         match self {
             Decoder::Cdr(schema) => cdr::decode(schema, message),
+            Decoder::Ros1(schema) => ros1::decode(schema, message),
         }
     }
 
@@ -59,6 +67,9 @@ impl Decoder {
         match self {
             Decoder::Cdr(schema) => {
                 signals::header_of_first_field(&cdr::decode_first_field(schema, message)?)
+            }
+            Decoder::Ros1(schema) => {
+                signals::header_of_first_field(&ros1::decode_first_field(schema, message)?)
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (schema, cdr: values) -> signals (samples)
+//! file -> reader (records, damage) -> decoder (values) -> signals (samples)
+//!           schema, idl: definitions      wire, cdr, ros1: messages
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -19,7 +20,11 @@ pub const APPLIED_CONTROL: &str = "applied_control";
 pub mod reader;
 pub mod value;
 pub mod schema;
+pub mod idl_tokens;
+pub mod idl;
+pub mod wire;
 pub mod cdr;
+pub mod ros1;
 pub mod cloud;
 pub mod signals;
 pub mod decoder;

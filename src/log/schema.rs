@@ -1,8 +1,9 @@
-//! Message definitions as text (`ros2msg`, and the same grammar in ROS 1) to a type tree.
+//! Message definitions as text (`ros2msg` and `ros1msg`) to a type tree.
 //!
 //! A definition holds the type itself and, after separator lines, every type that it uses, so a
 //! log explains its own messages and no type is built into this crate. Grammar: the ROS 2
-//! interface definition of messages, <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>.
+//! interface definition of messages, <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>,
+//! and ROS 1's older form of it with words of its own, <https://wiki.ros.org/msg>.
 
 use std::collections::BTreeMap;
 
@@ -63,13 +64,34 @@ struct RawField {
     arity: Arity,
 }
 
-/// Parse the concatenated definitions of the message `name` (`pkg/msg/Type` or `pkg/Type`).
+/// Whose words a definition uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Dialect {
+    Ros1,
+    Ros2,
+}
+
+/// Parse the concatenated ROS 2 definitions of the message `name` (`pkg/msg/Type` or `pkg/Type`).
 ///
 /// # Errors
 ///
 /// [`Error::Definition`] with the line: a field that cannot be read, a type that is neither
 /// built in nor defined, a type that contains itself.
 pub fn parse(name: &str, text: &str) -> Result<Schema> {
+    parse_dialect(Dialect::Ros2, name, text)
+}
+
+/// Parse the concatenated ROS 1 definitions of the message `name` (`pkg/Type`). Its `time` and
+/// `duration` become types with the fields `sec` and `nsec`.
+///
+/// # Errors
+///
+/// As [`parse`].
+pub fn parse_ros1(name: &str, text: &str) -> Result<Schema> {
+    parse_dialect(Dialect::Ros1, name, text)
+}
+
+fn parse_dialect(dialect: Dialect, name: &str, text: &str) -> Result<Schema> {
     let root = short_name(name);
     let mut raw: Vec<(String, Vec<RawField>)> = vec![(root.clone(), Vec::new())];
     let mut after_separator = false;
@@ -87,6 +109,17 @@ pub fn parse(name: &str, text: &str) -> Result<Schema> {
             fields.push(field);
         }
     }
+    if dialect == Dialect::Ros1 {
+        for (name, number) in [("time", "uint32"), ("duration", "int32")] {
+            let field = |name: &str| RawField {
+                line: 1,
+                type_name: number.to_string(),
+                name: name.to_string(),
+                arity: Arity::One,
+            };
+            raw.push((name.to_string(), vec![field("sec"), field("nsec")]));
+        }
+    }
     let index: BTreeMap<String, usize> =
         raw.iter().enumerate().rev().map(|(at, (name, _))| (name.clone(), at)).collect();
     let mut types = Vec::with_capacity(raw.len());
@@ -95,29 +128,35 @@ pub fn parse(name: &str, text: &str) -> Result<Schema> {
         let fields = fields
             .into_iter()
             .map(|field| {
-                let element = element(&field.type_name, &package, &index).ok_or_else(|| {
-                    Error::Definition {
-                        schema: name.into(),
-                        line: field.line,
-                        what: format!("type `{}` is not defined in the log", field.type_name),
-                    }
+                let element = element(dialect, &field.type_name, &package, &index);
+                let element = element.ok_or_else(|| Error::Definition {
+                    schema: name.into(),
+                    line: field.line,
+                    what: format!("type `{}` is not defined in the log", field.type_name),
                 })?;
                 Ok(Field { name: field.name, element, arity: field.arity })
             })
             .collect::<Result<_>>()?;
         types.push(StructType { name: type_name, fields });
     }
-    let schema = Schema { types };
-    let mut below = vec![None; schema.types.len()];
-    schema.check_depth(0, 0, &mut below).map_err(|what| Error::Definition {
-        schema: name.into(),
-        line: 1,
-        what,
-    })?;
-    Ok(schema)
+    Schema::of(name, types)
 }
 
 impl Schema {
+    /// A schema of these types, the message `name` first.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Definition`] if a type contains itself or types nest too deeply to be followed.
+    pub fn of(name: &str, types: Vec<StructType>) -> Result<Schema> {
+        let schema = Schema { types };
+        let mut below = vec![None; schema.types.len()];
+        match schema.check_depth(0, 0, &mut below) {
+            Ok(_) => Ok(schema),
+            Err(what) => Err(Error::Definition { schema: name.into(), line: 1, what }),
+        }
+    }
+
     /// Levels below a type. Each type is walked once, however many ways lead to it: `below` holds
     /// what is known, and `Some(None)` marks the types on the way down.
     fn check_depth(
@@ -149,13 +188,14 @@ impl Schema {
     }
 }
 
-/// `pkg/msg/Type` and `pkg/Type` are the same type.
+/// `pkg/msg/Type`, `pkg::msg::Type` and `pkg/Type` are the same type.
 pub fn short_name(name: &str) -> String {
-    name.replacen("/msg/", "/", 1)
+    name.replace("::", "/").replacen("/msg/", "/", 1)
 }
 
 /// One line of a definition: `None` for blanks, comments and constants.
 fn field(line: &str, number: usize) -> Result<Option<RawField>, String> {
+    // A string constant of ROS 1 may hold a `#`: what is cut off is its value, which nobody needs.
     let code = line.split('#').next().unwrap_or_default().trim();
     if code.is_empty() {
         return Ok(None);
@@ -192,9 +232,15 @@ fn field(line: &str, number: usize) -> Result<Option<RawField>, String> {
     Ok(Some(RawField { line: number, type_name, name: name.to_string(), arity }))
 }
 
-fn element(name: &str, package: &str, types: &BTreeMap<String, usize>) -> Option<Element> {
+fn element(
+    dialect: Dialect,
+    name: &str,
+    package: &str,
+    types: &BTreeMap<String, usize>,
+) -> Option<Element> {
     let scalar = match name {
         "bool" => Scalar::Bool,
+        "byte" if dialect == Dialect::Ros1 => Scalar::I8,
         "int8" => Scalar::I8,
         "uint8" | "byte" | "char" => Scalar::U8,
         "int16" => Scalar::I16,
@@ -206,16 +252,16 @@ fn element(name: &str, package: &str, types: &BTreeMap<String, usize>) -> Option
         "float32" => Scalar::F32,
         "float64" => Scalar::F64,
         "string" => return Some(Element::String),
-        "wstring" => return Some(Element::WideString),
+        "wstring" if dialect == Dialect::Ros2 => return Some(Element::WideString),
         _ => {
             let short = short_name(name);
-            let candidates = match short.as_str() {
-                "Header" => vec!["std_msgs/Header".to_string()],
-                local if !local.contains('/') => vec![format!("{package}/{local}")],
-                _ => vec![short.clone()],
+            let full = match short.as_str() {
+                "Header" => "std_msgs/Header".to_string(),
+                "time" | "duration" if dialect == Dialect::Ros1 => short,
+                local if !local.contains('/') => format!("{package}/{local}"),
+                _ => short,
             };
-            let found = candidates.iter().find_map(|name| types.get(name));
-            return found.map(|at| Element::Struct(*at));
+            return types.get(&full).map(|at| Element::Struct(*at));
         }
     };
     Some(Element::Scalar(scalar))

@@ -1,4 +1,4 @@
-//! ROS 2 message definitions for tests, as recorders embed them: a type and all that it uses.
+//! Message definitions for tests, as recorders embed them: a type and all that it uses.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -79,8 +79,8 @@ pub(crate) fn definition(name: &str) -> String {
     concatenated(name, &types())
 }
 
-/// A type with all that it uses, each after a separator line.
-pub(crate) fn concatenated(name: &str, types: &BTreeMap<String, String>) -> String {
+/// A type and all that it uses.
+fn with_parts(name: &str, types: &BTreeMap<String, String>) -> Vec<String> {
     let mut order = vec![name.to_string()];
     let mut at = 0;
     while at < order.len() {
@@ -95,8 +95,13 @@ pub(crate) fn concatenated(name: &str, types: &BTreeMap<String, String>) -> Stri
         }
         at += 1;
     }
+    order
+}
+
+/// A type with all that it uses, each after a separator line.
+pub(crate) fn concatenated(name: &str, types: &BTreeMap<String, String>) -> String {
     let mut text = types[name].clone();
-    for part in &order[1..] {
+    for part in &with_parts(name, types)[1..] {
         text += &format!("\n\n{}\nMSG: {part}\n{}", "=".repeat(80), types[part]);
     }
     text
@@ -105,4 +110,128 @@ pub(crate) fn concatenated(name: &str, types: &BTreeMap<String, String>) -> Stri
 /// `pkg/msg/Type`, as ROS 2 names the schema of a topic.
 pub(crate) fn schema_name(name: &str) -> String {
     name.replacen('/', "/msg/", 1)
+}
+
+/// The types above in the words of ROS 1.
+fn ros1_types() -> BTreeMap<String, String> {
+    let mut types = types();
+    types.remove("builtin_interfaces/Time");
+    for (name, text) in &mut types {
+        let fields = text.lines().map(|line| {
+            if line.contains('=') && !line.contains("<=") {
+                return line.to_string();
+            }
+            let mut words = line.split_whitespace();
+            let (kind, field) = (words.next().unwrap(), words.next().unwrap());
+            let kind = match kind {
+                "std_msgs/Header" => "Header",
+                "float64[<=3]" => "float64[]",
+                kind => kind,
+            };
+            match name.as_str() {
+                "sensor_msgs/CameraInfo" if field.len() == 1 => {
+                    format!("{kind} {}", field.to_uppercase())
+                }
+                _ => format!("{kind} {field}"),
+            }
+        });
+        *text = fields.collect::<Vec<_>>().join("\n");
+    }
+    let header = "# Two-integer timestamp\nuint32 seq\ntime stamp\nstring frame_id";
+    types.insert("std_msgs/Header".to_string(), header.to_string());
+    types
+}
+
+/// The definition of a type above as ROS 1 has it.
+pub(crate) fn ros1_definition(name: &str) -> String {
+    concatenated(name, &ros1_types())
+}
+
+/// The definition of a type above in IDL.
+pub(crate) fn idl_definition(name: &str) -> String {
+    idl(name, &types())
+}
+
+/// A type with all that it uses in IDL, as rosidl turns ROS 2 definitions into it and rosbag2
+/// stores it.
+pub(crate) fn idl(name: &str, types: &BTreeMap<String, String>) -> String {
+    let sections = with_parts(name, types).into_iter().map(|part| {
+        let (package, short) = part.split_once('/').unwrap();
+        let (mut typedefs, mut constants, mut members) =
+            (String::new(), String::new(), String::new());
+        for (index, line) in types[&part].lines().enumerate() {
+            let code = line.split('#').next().unwrap().trim();
+            if let Some((left, value)) = code.split_once('=').filter(|_| !code.contains("<=")) {
+                let (kind, name) = left.trim().split_once(char::is_whitespace).unwrap();
+                let kind = idl_type(kind, package, index);
+                constants += &format!("      const {kind} {} = {};\n", name.trim(), value.trim());
+            } else if let Some((kind, field)) = code.split_once(char::is_whitespace) {
+                let mut words = field.split_whitespace();
+                let field = words.next().unwrap();
+                if let Some(default) = words.next() {
+                    members += &format!("      @default (value={default})\n");
+                }
+                let (item, bound) = match kind.split_once('[') {
+                    Some((item, bound)) => (item, bound.strip_suffix(']')),
+                    None => (kind, None),
+                };
+                let item = idl_type(item, package, index);
+                let kind = match bound {
+                    None => item,
+                    Some("") => format!("sequence<{item}>"),
+                    Some(bound) => match bound.strip_prefix("<=") {
+                        Some(most) => format!("sequence<{item}, {most}>"),
+                        None => {
+                            let short = item.replace("::", "__").replace([' ', '<', '>'], "_");
+                            let alias = format!("{short}__{bound}");
+                            typedefs += &format!("    typedef {item} {alias}[{bound}];\n");
+                            alias
+                        }
+                    },
+                };
+                members += &format!(
+                    "      @verbatim (language=\"comment\", text=\n        \"what (it) is; \\\"so\\\"\" \
+                     \"\\n\" \"}}\")\n      @unit (value=\"m\")\n      {kind} {field};\n\n"
+                );
+            }
+        }
+        format!(
+            "{}\nIDL: {package}/msg/{short}\n// generated from rosidl_adapter/resource/msg.idl.em\n\
+             // with input from {package}/msg/{short}.msg\n\n#include \"std_msgs/msg/Header.idl\"\n\n\
+             module {package} {{\n  module msg {{\n{typedefs}    module {short}_Constants {{\n\
+             {constants}    }};\n    /* the type; struct of it */\n    struct {short} {{\n{members}    \
+             }};\n  }};\n}};\n",
+            "=".repeat(80),
+        )
+    });
+    sections.collect::<Vec<_>>().join("\n")
+}
+
+/// Odd lines use the older words for a type, and short names where the scope allows them.
+fn idl_type(kind: &str, package: &str, line: usize) -> String {
+    let is_odd = line % 2 == 1;
+    match kind {
+        "bool" => "boolean".to_string(),
+        "byte" => "octet".to_string(),
+        "char" => "uint8".to_string(),
+        "float32" => "float".to_string(),
+        "float64" => "double".to_string(),
+        "int16" if is_odd => "short".to_string(),
+        "uint16" if is_odd => "unsigned short".to_string(),
+        "int32" if is_odd => "long".to_string(),
+        "uint32" if is_odd => "unsigned long".to_string(),
+        "int64" if is_odd => "long long".to_string(),
+        "uint64" if is_odd => "unsigned long long".to_string(),
+        _ if kind.starts_with("string") || kind.starts_with("int") || kind.starts_with("uint") => {
+            match kind.split_once("<=") {
+                Some((kind, most)) => format!("{kind}<{most}>"),
+                None => kind.to_string(),
+            }
+        }
+        _ => match kind.split_once('/') {
+            Some((package, name)) => format!("{package}::msg::{name}"),
+            None if is_odd => kind.to_string(),
+            None => format!("{package}::msg::{kind}"),
+        },
+    }
 }

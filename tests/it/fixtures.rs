@@ -1,5 +1,5 @@
-//! Logs made for tests, by the `mcap` crate and a CDR encoder of its own: nothing of what is
-//! tested makes its input.
+//! Logs made for tests, by the `mcap` crate and an encoder of its own for CDR and ROS 1: nothing of
+//! what is tested makes its input.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -14,30 +14,38 @@ use mcap::{
     records::{MessageHeader, Metadata},
 };
 
-use crate::definitions::{definition, schema_name};
+use crate::definitions::{definition, idl_definition, ros1_definition, schema_name};
 
-/// Bytes of one message in plain CDR: numbers aligned to their size, behind a 4-byte head.
+/// Bytes of one message in plain CDR: numbers aligned to their size, behind a 4-byte head; or in
+/// ROS 1's serialisation, which is that without head, padding and zero bytes behind strings.
 pub(crate) struct Cdr {
     bytes: Vec<u8>,
     is_big_endian: bool,
-    /// 8 in encoding version 1, 4 in version 2.
+    /// 8 in encoding version 1, 4 in version 2, 1 in ROS 1.
     most_alignment: usize,
+    is_ros1: bool,
 }
 
 impl Cdr {
     pub(crate) fn new(is_big_endian: bool) -> Cdr {
-        Cdr { bytes: vec![0, u8::from(!is_big_endian), 0, 0], is_big_endian, most_alignment: 8 }
+        let head = vec![0, u8::from(!is_big_endian), 0, 0];
+        Cdr { bytes: head, is_big_endian, most_alignment: 8, is_ros1: false }
     }
 
     pub(crate) fn version_2(is_big_endian: bool) -> Cdr {
         let head = vec![0, 6 + u8::from(!is_big_endian), 0, 0];
-        Cdr { bytes: head, is_big_endian, most_alignment: 4 }
+        Cdr { bytes: head, is_big_endian, most_alignment: 4, is_ros1: false }
+    }
+
+    pub(crate) fn ros1() -> Cdr {
+        Cdr { bytes: Vec::new(), is_big_endian: false, most_alignment: 1, is_ros1: true }
     }
 
     /// A number by its little-endian bytes.
     pub(crate) fn number<const N: usize>(&mut self, mut little: [u8; N]) -> &mut Cdr {
         let alignment = N.min(self.most_alignment);
-        while !(self.bytes.len() - 4).is_multiple_of(alignment) {
+        // The head's 4 bytes count only where there is alignment beyond them.
+        while alignment > 1 && !(self.bytes.len() - 4).is_multiple_of(alignment) {
             self.bytes.push(0);
         }
         if self.is_big_endian {
@@ -75,9 +83,10 @@ impl Cdr {
     }
 
     pub(crate) fn text(&mut self, text: &str) -> &mut Cdr {
-        self.u32(text.len() as u32 + 1);
+        let end: &[u8] = if self.is_ros1 { &[] } else { &[0] };
+        self.u32((text.len() + end.len()) as u32);
         self.bytes.extend_from_slice(text.as_bytes());
-        self.bytes.push(0);
+        self.bytes.extend_from_slice(end);
         self
     }
 
@@ -92,6 +101,10 @@ impl Cdr {
     pub(crate) fn header(&mut self, stamp_ns: i64, frame_id: &str) -> &mut Cdr {
         let (sec, nanosec) =
             (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+        if self.is_ros1 {
+            // Its sequence number, which no one should need.
+            self.u32(7);
+        }
         self.i32(sec as i32).u32(nanosec as u32).text(frame_id)
     }
 
@@ -110,9 +123,18 @@ pub(crate) struct Recorded {
     pub(crate) data: Vec<u8>,
 }
 
+/// What definitions and messages are written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    Ros2Msg,
+    Ros2Idl,
+    Ros1,
+}
+
 /// How a file is laid out.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
+    pub(crate) format: Format,
     pub(crate) compression: Option<Compression>,
     pub(crate) is_chunked: bool,
     pub(crate) chunk_bytes: u64,
@@ -124,6 +146,7 @@ pub(crate) struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Layout {
+            format: Format::Ros2Msg,
             compression: None,
             is_chunked: true,
             chunk_bytes: 16 << 10,
@@ -150,10 +173,17 @@ pub(crate) fn mcap_bytes(messages: &[Recorded], layout: &Layout) -> Vec<u8> {
     }
     for (sequence, message) in messages.iter().enumerate() {
         let channel_id = *channels.entry(message.topic).or_insert_with(|| {
-            let text = definition(message.type_name);
-            let name = schema_name(message.type_name);
-            let schema = writer.add_schema(&name, "ros2msg", text.as_bytes()).unwrap();
-            writer.add_channel(schema, message.topic, "cdr", &BTreeMap::new()).unwrap()
+            let ros2 = schema_name(message.type_name);
+            let (name, encoding, text, messages) = match layout.format {
+                Format::Ros2Msg => (ros2, "ros2msg", definition(message.type_name), "cdr"),
+                Format::Ros2Idl => (ros2, "ros2idl", idl_definition(message.type_name), "cdr"),
+                Format::Ros1 => {
+                    let name = message.type_name.to_string();
+                    (name, "ros1msg", ros1_definition(message.type_name), "ros1")
+                }
+            };
+            let schema = writer.add_schema(&name, encoding, text.as_bytes()).unwrap();
+            writer.add_channel(schema, message.topic, messages, &BTreeMap::new()).unwrap()
         });
         let header = MessageHeader {
             channel_id,
@@ -303,8 +333,15 @@ impl DriveLog {
         path
     }
 
+    fn empty(&self) -> Cdr {
+        match self.layout.format {
+            Format::Ros1 => Cdr::ros1(),
+            Format::Ros2Msg | Format::Ros2Idl => Cdr::new(self.is_big_endian),
+        }
+    }
+
     fn cdr(&self, t: f64, frame_id: &str) -> Cdr {
-        let mut cdr = Cdr::new(self.is_big_endian);
+        let mut cdr = self.empty();
         let stamp_ns = if self.has_header_stamps { self.start_ns + ns(t) } else { 0 };
         cdr.header(stamp_ns, frame_id);
         cdr
@@ -393,7 +430,7 @@ impl DriveLog {
         let optical = [-0.5, 0.5, -0.5, 0.5];
         let camera = [CAMERA_AHEAD_M, 0.0, CAMERA_UP_M];
         let none = [0.0, 0.0, 0.0, 1.0];
-        let mut cdr = Cdr::new(self.is_big_endian);
+        let mut cdr = self.empty();
         cdr.u32(3);
         for (child, place, rotation) in
             [("camera", camera, optical), ("lidar", [0.0; 3], none), ("radar", camera, none)]

@@ -8,6 +8,8 @@ mod schemas;
 mod definitions;
 mod fixtures;
 mod decoding;
+mod ros1;
+mod idl;
 mod logs;
 mod alignment;
 mod ingest;
