@@ -23,14 +23,15 @@ use polars::{
 use crate::{
     dataset::{
         manifest::{LogRecord, Manifest},
+        open,
         split::Split,
     },
     drops::Reason,
     error::{Error, Result},
     frame::{Command, FUTURE_STEPS, RouteSource},
     stats::summary::{
-        Dataset, Distribution, Group, Groups, LeftOut, Loss, Part, Quantiles, Shares, Signals,
-        Skew, Skews, Splits, Summary, VERSION,
+        Dataset, Distribution, Group, Groups, Holdout, LeftOut, Loss, Part, Quantiles, Shares,
+        Signals, Skew, Skews, Splits, Summary, VERSION,
     },
 };
 
@@ -96,6 +97,7 @@ pub fn summarise(dataset: &Path) -> Result<Summary> {
             control: all.skew("control_skew"),
         },
         groups: groups(dataset, frames)?,
+        holdout: holdout(dataset)?,
         left_out: left_out(&manifest),
     })
 }
@@ -314,6 +316,16 @@ fn count_by(
         (word.map(str::to_string), count.unwrap_or_default() as u64)
     };
     Ok(pairs.map(entry).collect())
+}
+
+fn holdout(dataset: &Path) -> Result<Holdout> {
+    let opened = open::Dataset::open(dataset)?;
+    Ok(Holdout {
+        train_frames: opened.train.len() as u64,
+        val_frames: opened.val.len() as u64,
+        how: opened.holdout.how,
+        is_time_block: opened.holdout.is_time_block,
+    })
 }
 
 fn left_out(manifest: &Manifest) -> LeftOut {

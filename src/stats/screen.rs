@@ -31,6 +31,7 @@ impl Display for Screen<'_> {
         let rate = dataset.rate_hz;
         writeln!(f, "{}  {} at {rate} Hz, {}", dataset.name, dataset.identity, dataset.written_by)?;
         self.amounts(f)?;
+        self.holdout(f)?;
         self.shares(f)?;
         self.signals(f)?;
         self.skews(f)?;
@@ -40,6 +41,13 @@ impl Display for Screen<'_> {
 }
 
 impl Screen<'_> {
+    fn holdout(&self, f: &mut Formatter) -> fmt::Result {
+        let holdout = &self.0.holdout;
+        let (train, val) = (grouped(holdout.train_frames), grouped(holdout.val_frames));
+        let weak = if holdout.is_time_block { " (weak evidence)" } else { "" };
+        writeln!(f, "{train} frames train, {val} judge{weak}: {}", holdout.how)
+    }
+
     fn amounts(&self, f: &mut Formatter) -> fmt::Result {
         let head = ["episodes", "frames", "hours", "km", "mean m/s", "3 s of future"];
         header(f, "", &head)?;

@@ -16,6 +16,7 @@ pub struct Summary {
     pub version: u32,
     pub dataset: Dataset,
     pub splits: Splits,
+    pub holdout: Holdout,
     pub signals: Signals,
     pub skews: Skews,
     pub groups: Groups,
@@ -31,6 +32,18 @@ pub struct Dataset {
     pub identity: String,
     pub written_by: String,
     pub rate_hz: f64,
+}
+
+/// Which frames `pmp-train` learns from and `pmp-eval` judges with: the splits, or where they leave
+/// a side empty, what stands in for them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Holdout {
+    pub train_frames: u64,
+    pub val_frames: u64,
+    /// How those that judge were set apart, one sentence.
+    pub how: String,
+    /// They are a stretch of an episode that is trained on too: weak evidence.
+    pub is_time_block: bool,
 }
 
 /// Amounts by split; a split without episodes is `None`.
