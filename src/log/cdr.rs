@@ -120,6 +120,7 @@ impl<'a> Cursor<'a> {
                 Some(len) => self.take(len)?,
                 None => return Err(self.fail("an array longer than the memory")),
             };
+            let bytes = Cow::Borrowed(bytes);
             return Ok(Value::Numbers(Numbers { bytes, scalar, endian: self.endian }));
         }
         if count > MAX_LIST_ELEMENTS.min(self.data.len().saturating_sub(self.at)) {
@@ -156,6 +157,7 @@ impl<'a> Cursor<'a> {
                     Some(len) => self.take(len)?,
                     None => return Err(self.fail("a string longer than the memory")),
                 };
+                let bytes = Cow::Borrowed(bytes);
                 let numbers = Numbers { bytes, scalar: Scalar::U16, endian: self.endian };
                 let units: Vec<u16> = numbers.iter().map(|unit| unit as u16).collect();
                 Ok(Value::Text(Cow::Owned(String::from_utf16_lossy(&units))))

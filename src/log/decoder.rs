@@ -5,7 +5,7 @@
 use crate::{
     error::Result,
     log::{
-        cdr,
+        cdr, json, protobuf,
         reader::Channel,
         schema::{self, Schema},
         signals::{self, Header},
@@ -18,6 +18,9 @@ use crate::{
 pub enum Decoder {
     /// ROS 2: `ros2msg` definitions, CDR messages.
     Cdr(Schema),
+    Protobuf(protobuf::Schema),
+    /// JSON, with a JSON Schema or an empty one.
+    Json(json::Schema),
 }
 
 impl Decoder {
@@ -35,6 +38,12 @@ impl Decoder {
                 let schema = schema::parse(&record.name, text()?);
                 Ok(Decoder::Cdr(schema.map_err(|error| error.to_string())?))
             }
+            ("protobuf", "protobuf") => {
+                protobuf::parse(&record.name, &record.data).map(Decoder::Protobuf)
+            }
+            ("jsonschema" | "", "json") => {
+                json::parse(&record.name, &record.data).map(Decoder::Json)
+            }
             _ => Err(format!("`{definition}` definitions of `{message}` messages are not read")),
         }
     }
@@ -47,6 +56,8 @@ impl Decoder {
     pub fn decode<'a>(&'a self, message: &'a [u8]) -> Result<Struct<'a>> {
         match self {
             Decoder::Cdr(schema) => cdr::decode(schema, message),
+            Decoder::Protobuf(schema) => protobuf::decode(schema, message),
+            Decoder::Json(schema) => json::decode(schema, message, None),
         }
     }
 
@@ -57,8 +68,19 @@ impl Decoder {
     /// As [`decode`](Decoder::decode); also if the message has no header.
     pub fn header(&self, message: &[u8]) -> Result<Header> {
         match self {
+            // Foxglove's messages begin with the parts of a header. Nothing large is copied.
+            Decoder::Cdr(schema)
+                if schema.types[0].fields.iter().any(|f| f.name == "timestamp") =>
+            {
+                signals::header(&cdr::decode(schema, message)?)
+            }
             Decoder::Cdr(schema) => {
                 signals::header_of_first_field(&cdr::decode_first_field(schema, message)?)
+            }
+            Decoder::Protobuf(schema) => signals::header(&protobuf::decode(schema, message)?),
+            Decoder::Json(schema) => {
+                let fields = ["header", "timestamp", "frame_id"];
+                signals::header(&json::decode(schema, message, Some(&fields))?)
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (schema, cdr: values) -> signals (samples)
+//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
+//!           decoder: schema and cdr (ROS), protobuf, json, by the channel's encodings
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -20,8 +21,10 @@ pub mod reader;
 pub mod value;
 pub mod schema;
 pub mod cdr;
-pub mod cloud;
+pub mod protobuf;
+pub mod json;
 pub mod signals;
+pub mod cloud;
 pub mod decoder;
 pub mod transforms;
 pub mod recording;
