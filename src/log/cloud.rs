@@ -9,7 +9,7 @@ use crate::{
     error::{Error, Result},
     log::{
         signals::{self, Pose},
-        value::{Endian, Scalar, Struct},
+        value::{Endian, Scalar, Struct, Value},
     },
 };
 
@@ -57,7 +57,10 @@ impl<'a> Cloud<'a> {
                 let bytes = data.len();
                 return Err(fail(format!("{bytes} bytes are no points of {point_step} bytes")));
             }
-            let pose = message.optional_part("pose")?.map(signals::pose).transpose()?;
+            let pose = match message.get("pose") {
+                None | Some(Value::Absent) => None,
+                Some(_) => Some(signals::pose(message.part("pose")?)?),
+            };
             return Ok(Cloud {
                 fields: fields(message, point_step, "type", foxglove_scalar)?,
                 frame_from_points: pose,

@@ -5,7 +5,7 @@
 use crate::{
     error::Result,
     log::{
-        cdr, json, protobuf,
+        cdr, descriptors, json, protobuf,
         reader::Channel,
         schema::{self, Schema},
         signals::{self, Header},
@@ -18,7 +18,7 @@ use crate::{
 pub enum Decoder {
     /// ROS 2: `ros2msg` definitions, CDR messages.
     Cdr(Schema),
-    Protobuf(protobuf::Schema),
+    Protobuf(descriptors::Schema),
     /// JSON, with a JSON Schema or an empty one.
     Json(json::Schema),
 }
@@ -39,7 +39,7 @@ impl Decoder {
                 Ok(Decoder::Cdr(schema.map_err(|error| error.to_string())?))
             }
             ("protobuf", "protobuf") => {
-                protobuf::parse(&record.name, &record.data).map(Decoder::Protobuf)
+                descriptors::parse(&record.name, &record.data).map(Decoder::Protobuf)
             }
             ("jsonschema" | "", "json") => {
                 json::parse(&record.name, &record.data).map(Decoder::Json)

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
-//!           decoder: schema and cdr (ROS), protobuf, json, by the channel's encodings
+//!           decoder: schema and cdr (ROS), descriptors and protobuf, json, by the channel's encodings
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -21,6 +21,7 @@ pub mod reader;
 pub mod value;
 pub mod schema;
 pub mod cdr;
+pub mod descriptors;
 pub mod protobuf;
 pub mod json;
 pub mod signals;

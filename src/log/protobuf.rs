@@ -1,22 +1,18 @@
 //! Protobuf bytes to values, by the descriptors that the log carries.
 //!
-//! MCAP's profile: the schema is a serialised `FileDescriptorSet` and its name is the message's
-//! full name, <https://mcap.dev/spec/registry#protobuf>. The wire format is that of
-//! <https://protobuf.dev/programming-guides/encoding/>. The descriptors are linked by a library;
-//! the messages are walked here, because pictures and clouds can then stay where they lie and
-//! every limit is ours, neither of which a library's dynamic message offers.
+//! The wire format of <https://protobuf.dev/programming-guides/encoding/>. The descriptors are
+//! linked by a library; the messages are walked here, because pictures and clouds can then stay
+//! where they lie and every limit is ours, neither of which a library's dynamic message offers.
 
-use std::{borrow::Cow, collections::BTreeMap, ops::Range};
-
-use prost_reflect::{DescriptorPool, FieldDescriptor, Kind, MessageDescriptor};
+use std::{borrow::Cow, ops::Range};
 
 use crate::{
     error::{Error, Result},
-    log::value::{Endian, Numbers, Scalar, Struct, Value},
+    log::{
+        descriptors::{Element, Field, MessageType, Schema, bytes_value},
+        value::{Endian, Scalar, Struct, Value},
+    },
 };
-
-/// Longest definition that is read: linking takes a hundred times its size.
-const MAX_DEFINITION_BYTES: usize = 1 << 20;
 
 /// Deepest nesting of parts that is followed. Real messages stay below 10.
 const MAX_DEPTH: usize = 64;
@@ -24,165 +20,6 @@ const MAX_DEPTH: usize = 64;
 /// Most values in one message, absent ones among them. Bytes and packed numbers of a fixed size
 /// count once, since they are not copied.
 const MAX_VALUES: usize = 1 << 20;
-
-/// A message type with all the types that it uses.
-#[derive(Clone, Debug)]
-pub struct Schema {
-    /// The types; the message itself is the first.
-    types: Vec<MessageType>,
-}
-
-#[derive(Clone, Debug)]
-struct MessageType {
-    name: String,
-    /// Ascending by number.
-    fields: Vec<Field>,
-}
-
-#[derive(Clone, Debug)]
-struct Field {
-    number: u32,
-    name: String,
-    element: Element,
-    is_list: bool,
-    /// What the field holds where the message does not have it.
-    default: Value<'static>,
-}
-
-/// What a field holds one or many of.
-#[derive(Clone, Copy, Debug)]
-enum Element {
-    /// Its bytes, little-endian.
-    Fixed(Scalar),
-    Varint(Scalar),
-    /// A varint whose lowest bit is the sign.
-    ZigZag,
-    Text,
-    Bytes,
-    /// Index in [`Schema::types`].
-    Message(usize),
-}
-
-/// Link the descriptors of the message `name`, for example `foxglove.CompressedImage`.
-///
-/// # Errors
-///
-/// A sentence: the bytes are no `FileDescriptorSet` of at most 1 MiB, its parts do not fit
-/// together, or the message is not among them.
-pub fn parse(name: &str, descriptors: &[u8]) -> Result<Schema, String> {
-    if descriptors.len() > MAX_DEFINITION_BYTES {
-        return Err(format!("its descriptors are longer than {MAX_DEFINITION_BYTES} bytes"));
-    }
-    let pool = DescriptorPool::decode(descriptors)
-        .map_err(|error| format!("its descriptors cannot be read: {error}"))?;
-    let root = pool
-        .get_message_by_name(name)
-        .ok_or_else(|| format!("its descriptors do not define `{name}`"))?;
-    let mut messages = vec![root];
-    let mut index = BTreeMap::from([(name.to_string(), 0)]);
-    let mut types = Vec::new();
-    while let Some(message) = messages.get(types.len()).cloned() {
-        let mut at_of = |inner: MessageDescriptor| {
-            *index.entry(inner.full_name().to_string()).or_insert_with(|| {
-                messages.push(inner);
-                messages.len() - 1
-            })
-        };
-        let mut fields: Vec<_> =
-            message.fields().map(|field| Field::new(&field, &mut at_of)).collect();
-        fields.sort_by_key(|field| field.number);
-        types.push(MessageType { name: message.full_name().to_string(), fields });
-    }
-    Ok(Schema { types })
-}
-
-impl Field {
-    fn new(
-        descriptor: &FieldDescriptor,
-        at_of: &mut impl FnMut(MessageDescriptor) -> usize,
-    ) -> Field {
-        let element = match descriptor.kind() {
-            Kind::Double => Element::Fixed(Scalar::F64),
-            Kind::Float => Element::Fixed(Scalar::F32),
-            Kind::Fixed32 => Element::Fixed(Scalar::U32),
-            Kind::Fixed64 => Element::Fixed(Scalar::U64),
-            Kind::Sfixed32 => Element::Fixed(Scalar::I32),
-            Kind::Sfixed64 => Element::Fixed(Scalar::I64),
-            Kind::Bool => Element::Varint(Scalar::Bool),
-            Kind::Int32 | Kind::Enum(_) => Element::Varint(Scalar::I32),
-            Kind::Uint32 => Element::Varint(Scalar::U32),
-            Kind::Int64 => Element::Varint(Scalar::I64),
-            Kind::Uint64 => Element::Varint(Scalar::U64),
-            Kind::Sint32 | Kind::Sint64 => Element::ZigZag,
-            Kind::String => Element::Text,
-            Kind::Bytes => Element::Bytes,
-            Kind::Message(inner) => Element::Message(at_of(inner)),
-        };
-        // Maps are lists of entries on the wire.
-        let is_list = descriptor.is_list() || descriptor.is_map();
-        let (number, name) = (descriptor.number(), descriptor.name().to_string());
-        let default = match (is_list, element) {
-            (true, _) => element.no_elements(),
-            (false, Element::Message(_)) => Value::Absent,
-            (false, _) => value_of(&descriptor.default_value()),
-        };
-        Field { number, name, element, is_list, default }
-    }
-}
-
-impl Element {
-    /// How a list of these is stored: numbers as such, all else value by value.
-    fn no_elements(self) -> Value<'static> {
-        let scalar = match self {
-            Element::Fixed(scalar) => scalar,
-            Element::Varint(Scalar::U64) => Scalar::U64,
-            Element::Varint(_) | Element::ZigZag => Scalar::I64,
-            Element::Text | Element::Bytes | Element::Message(_) => return Value::List(Vec::new()),
-        };
-        Value::Numbers(Numbers { bytes: Cow::Borrowed(&[]), scalar, endian: Endian::Little })
-    }
-
-    /// The wire type of one element.
-    fn wire_type(self) -> u64 {
-        match self {
-            Element::Varint(_) | Element::ZigZag => VARINT,
-            Element::Fixed(scalar) if scalar.size() == 8 => EIGHT_BYTES,
-            Element::Fixed(_) => FOUR_BYTES,
-            Element::Text | Element::Bytes | Element::Message(_) => LENGTH,
-        }
-    }
-
-    fn integer(self, varint: u64) -> i64 {
-        match self {
-            Element::ZigZag => (varint >> 1) as i64 ^ -((varint & 1) as i64),
-            Element::Varint(Scalar::Bool) => i64::from(varint != 0),
-            Element::Varint(Scalar::I32) => i64::from(varint as i32),
-            Element::Varint(Scalar::U32) => i64::from(varint as u32),
-            _ => varint as i64,
-        }
-    }
-}
-
-/// The default of a field that is one value and no message; in proto2 the definition may say it.
-fn value_of(default: &prost_reflect::Value) -> Value<'static> {
-    use prost_reflect::Value as Default;
-    match default {
-        Default::Bool(value) => Value::Int(i64::from(*value)),
-        Default::I32(value) | Default::EnumNumber(value) => Value::Int(i64::from(*value)),
-        Default::I64(value) => Value::Int(*value),
-        Default::U32(value) => Value::Int(i64::from(*value)),
-        Default::U64(value) => Value::Int(*value as i64),
-        Default::F32(value) => Value::Float(f64::from(*value)),
-        Default::F64(value) => Value::Float(*value),
-        Default::String(value) => Value::Text(Cow::Owned(value.clone())),
-        Default::Bytes(value) => bytes_value(Cow::Owned(value.to_vec())),
-        Default::Message(_) | Default::List(_) | Default::Map(_) => Value::Absent,
-    }
-}
-
-fn bytes_value(bytes: Cow<[u8]>) -> Value {
-    Value::Numbers(Numbers { bytes, scalar: Scalar::U8, endian: Endian::Little })
-}
 
 /// Decode a whole message. Fields that it leaves out have their defaults, and parts that it
 /// leaves out are [`Value::Absent`]: not leaving them out is how a writer says that they are zero.
@@ -203,6 +40,28 @@ const LENGTH: u64 = 2;
 const GROUP: u64 = 3;
 const END_GROUP: u64 = 4;
 const FOUR_BYTES: u64 = 5;
+
+impl Element {
+    /// The wire type of one element.
+    fn wire_type(self) -> u64 {
+        match self {
+            Element::Varint(_) | Element::ZigZag => VARINT,
+            Element::Fixed(scalar) if scalar.size() == 8 => EIGHT_BYTES,
+            Element::Fixed(_) => FOUR_BYTES,
+            Element::Text | Element::Bytes | Element::Message(_) => LENGTH,
+        }
+    }
+
+    fn integer(self, varint: u64) -> i64 {
+        match self {
+            Element::ZigZag => (varint >> 1) as i64 ^ -((varint & 1) as i64),
+            Element::Varint(Scalar::Bool) => i64::from(varint != 0),
+            Element::Varint(Scalar::I32) => i64::from(varint as i32),
+            Element::Varint(Scalar::U32) => i64::from(varint as u32),
+            _ => varint as i64,
+        }
+    }
+}
 
 struct Decoding<'a> {
     schema: &'a Schema,
@@ -305,9 +164,10 @@ impl<'a> Decoding<'a> {
         let key_end = *at;
         let one = match field.element {
             Element::Fixed(scalar) => {
-                let bytes = self.take(scalar.size(), at, end)?;
+                let bytes = self.take(scalar.size() as u64, at, end)?;
                 if let Value::Numbers(numbers) = value {
-                    return Ok(extend(&mut numbers.bytes, bytes));
+                    extend(&mut numbers.bytes, bytes);
+                    return Ok(());
                 }
                 match scalar {
                     Scalar::F32 | Scalar::F64 => Value::Float(scalar.read(bytes, Endian::Little)),
@@ -323,7 +183,8 @@ impl<'a> Decoding<'a> {
                 let integer = element.integer(self.varint(at, end)?);
                 if let Value::Numbers(numbers) = value {
                     self.count(1, key_end)?;
-                    return Ok(extend_owned(&mut numbers.bytes, integer));
+                    extend_owned(&mut numbers.bytes, integer);
+                    return Ok(());
                 }
                 Value::Int(integer)
             }
@@ -361,7 +222,8 @@ impl<'a> Decoding<'a> {
                 let what = format!("{} bytes of {}-byte numbers", packed.len(), scalar.size());
                 return Err(self.fail(packed.start, what));
             }
-            return Ok(extend(&mut numbers.bytes, &self.message[packed]));
+            extend(&mut numbers.bytes, &self.message[packed]);
+            return Ok(());
         }
         let mut at = packed.start;
         while at < packed.end {
@@ -377,15 +239,25 @@ impl<'a> Decoding<'a> {
         let mut groups = 0_usize;
         let mut wire_type = wire_type;
         loop {
-            match wire_type {
-                VARINT => drop(self.varint(at, end)?),
-                EIGHT_BYTES => drop(self.take(8, at, end)?),
-                FOUR_BYTES => drop(self.take(4, at, end)?),
-                LENGTH => drop(self.length(at, end)?),
-                GROUP => groups += 1,
-                END_GROUP if groups > 0 => groups -= 1,
+            let len = match wire_type {
+                VARINT => {
+                    self.varint(at, end)?;
+                    0
+                }
+                LENGTH => self.varint(at, end)?,
+                EIGHT_BYTES => 8,
+                FOUR_BYTES => 4,
+                GROUP => {
+                    groups += 1;
+                    0
+                }
+                END_GROUP if groups > 0 => {
+                    groups -= 1;
+                    0
+                }
                 _ => return Err(self.fail(*at, format!("wire type {wire_type}"))),
-            }
+            };
+            self.take(len, at, end)?;
             if groups == 0 {
                 return Ok(());
             }
@@ -408,20 +280,19 @@ impl<'a> Decoding<'a> {
     /// Where the bytes lie whose number comes first.
     fn length(&self, at: &mut usize, end: usize) -> Result<Range<usize>> {
         let len = self.varint(at, end)?;
-        // What does not fit the address space does not fit the message.
-        let len = usize::try_from(len).unwrap_or(usize::MAX);
         let start = *at;
         self.take(len, at, end)?;
         Ok(start..*at)
     }
 
-    fn take(&self, len: usize, at: &mut usize, end: usize) -> Result<&'a [u8]> {
+    fn take(&self, len: u64, at: &mut usize, end: usize) -> Result<&'a [u8]> {
         let left = end - *at;
-        if len > left {
+        if len > left as u64 {
             return Err(self.fail(*at, format!("{len} bytes are needed and {left} are left")));
         }
-        *at += len;
-        Ok(&self.message[*at - len..*at])
+        let start = *at;
+        *at += len as usize;
+        Ok(&self.message[start..*at])
     }
 }
 
