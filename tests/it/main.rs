@@ -10,6 +10,7 @@ mod fixtures;
 mod foxglove_fixtures;
 mod decoding;
 mod foxglove;
+mod protobuf;
 mod logs;
 mod alignment;
 mod ingest;
