@@ -6,7 +6,11 @@
 
 use std::{borrow::Cow, collections::BTreeMap};
 
-use prost_reflect::{DescriptorPool, FieldDescriptor, Kind, MessageDescriptor};
+use prost::Message;
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, FieldDescriptorProto, FileDescriptorSet,
+    field_descriptor_proto::{Label, Type},
+};
 
 use crate::log::value::{Endian, Numbers, Scalar, Value};
 
@@ -45,7 +49,7 @@ pub enum Element {
     Fixed(Scalar),
     Varint(Scalar),
     /// A varint whose lowest bit is the sign.
-    ZigZag,
+    ZigZag(Scalar),
     Text,
     Bytes,
     /// Index in [`Schema::types`].
@@ -56,66 +60,133 @@ pub enum Element {
 ///
 /// # Errors
 ///
-/// A sentence: the bytes are no `FileDescriptorSet` of at most 1 MiB, its parts do not fit
-/// together, or the message is not among them.
+/// A sentence: the bytes are no `FileDescriptorSet` of at most 1 MiB, the message is not among its
+/// types, or one that it uses is not.
 pub fn parse(name: &str, descriptors: &[u8]) -> Result<Schema, String> {
     if descriptors.len() > MAX_DEFINITION_BYTES {
         return Err(format!("its descriptors are longer than {MAX_DEFINITION_BYTES} bytes"));
     }
-    let pool = DescriptorPool::decode(descriptors)
+    let set = FileDescriptorSet::decode(descriptors)
         .map_err(|error| format!("its descriptors cannot be read: {error}"))?;
-    let root = pool
-        .get_message_by_name(name)
-        .ok_or_else(|| format!("its descriptors do not define `{name}`"))?;
-    let mut messages = vec![root];
-    let mut index = BTreeMap::from([(name.to_string(), 0)]);
+    let mut named = Named::default();
+    for file in &set.file {
+        let package = file.package.as_deref().filter(|package| !package.is_empty());
+        let scope = package.map_or(String::new(), |package| format!(".{package}"));
+        named.add(&scope, &file.message_type, &file.enum_type);
+    }
+    let root = format!(".{name}");
+    let mut names = vec![root.clone()];
+    let mut index = BTreeMap::from([(root, 0)]);
     let mut types = Vec::new();
-    while let Some(message) = messages.get(types.len()).cloned() {
-        let mut at_of = |inner: MessageDescriptor| {
-            *index.entry(inner.full_name().to_string()).or_insert_with(|| {
-                messages.push(inner);
-                messages.len() - 1
-            })
-        };
-        let mut fields: Vec<_> =
-            message.fields().map(|field| Field::new(&field, &mut at_of)).collect();
+    while let Some(name) = names.get(types.len()) {
+        let (name, message) = (name.trim_start_matches('.').to_string(), named.messages.get(name));
+        let message = message.ok_or_else(|| format!("its descriptors do not define `{name}`"))?;
+        let mut fields = Vec::with_capacity(message.field.len());
+        for field in &message.field {
+            let mut at_of = |inner: &str| {
+                *index.entry(inner.to_string()).or_insert_with(|| {
+                    names.push(inner.to_string());
+                    names.len() - 1
+                })
+            };
+            fields.extend(Field::new(field, &named, &mut at_of)?);
+        }
         fields.sort_by_key(|field| field.number);
-        types.push(MessageType { name: message.full_name().to_string(), fields });
+        types.push(MessageType { name, fields });
     }
     Ok(Schema { types })
 }
 
+/// The types of a set by their full names, each with a dot before it.
+#[derive(Default)]
+struct Named<'s> {
+    messages: BTreeMap<String, &'s DescriptorProto>,
+    enums: BTreeMap<String, &'s EnumDescriptorProto>,
+}
+
+impl<'s> Named<'s> {
+    fn add(
+        &mut self,
+        scope: &str,
+        messages: &'s [DescriptorProto],
+        enums: &'s [EnumDescriptorProto],
+    ) {
+        for part in enums {
+            self.enums.insert(format!("{scope}.{}", part.name()), part);
+        }
+        // The parser follows no more than 100 levels.
+        for message in messages {
+            let name = format!("{scope}.{}", message.name());
+            self.add(&name, &message.nested_type, &message.enum_type);
+            self.messages.insert(name, message);
+        }
+    }
+
+    /// The number of an enum's value; without a name that of its first.
+    fn number(&self, name: &str, value: Option<&str>) -> i64 {
+        let values = self.enums.get(name).map_or(&[][..], |part| &part.value);
+        let is_wanted = |known: &str| value.is_none_or(|value| value == known);
+        let found = values.iter().find(|known| is_wanted(known.name()));
+        found.map_or(0, |known| i64::from(known.number()))
+    }
+}
+
 impl Field {
+    /// `None` for a group, which is no part of proto3.
     fn new(
-        descriptor: &FieldDescriptor,
-        at_of: &mut impl FnMut(MessageDescriptor) -> usize,
-    ) -> Field {
-        let element = match descriptor.kind() {
-            Kind::Double => Element::Fixed(Scalar::F64),
-            Kind::Float => Element::Fixed(Scalar::F32),
-            Kind::Fixed32 => Element::Fixed(Scalar::U32),
-            Kind::Fixed64 => Element::Fixed(Scalar::U64),
-            Kind::Sfixed32 => Element::Fixed(Scalar::I32),
-            Kind::Sfixed64 => Element::Fixed(Scalar::I64),
-            Kind::Bool => Element::Varint(Scalar::Bool),
-            Kind::Int32 | Kind::Enum(_) => Element::Varint(Scalar::I32),
-            Kind::Uint32 => Element::Varint(Scalar::U32),
-            Kind::Int64 => Element::Varint(Scalar::I64),
-            Kind::Uint64 => Element::Varint(Scalar::U64),
-            Kind::Sint32 | Kind::Sint64 => Element::ZigZag,
-            Kind::String => Element::Text,
-            Kind::Bytes => Element::Bytes,
-            Kind::Message(inner) => Element::Message(at_of(inner)),
+        descriptor: &FieldDescriptorProto,
+        named: &Named,
+        at_of: &mut impl FnMut(&str) -> usize,
+    ) -> Result<Option<Field>, String> {
+        let name = descriptor.name().to_string();
+        let wrong = |what: &str| format!("its descriptors give field `{name}` no {what}");
+        let number = u32::try_from(descriptor.number()).map_err(|_error| wrong("number"))?;
+        let kind = Type::try_from(descriptor.r#type.unwrap_or_default());
+        let element = match kind.map_err(|_error| wrong("type"))? {
+            Type::Double => Element::Fixed(Scalar::F64),
+            Type::Float => Element::Fixed(Scalar::F32),
+            Type::Fixed32 => Element::Fixed(Scalar::U32),
+            Type::Fixed64 => Element::Fixed(Scalar::U64),
+            Type::Sfixed32 => Element::Fixed(Scalar::I32),
+            Type::Sfixed64 => Element::Fixed(Scalar::I64),
+            Type::Bool => Element::Varint(Scalar::Bool),
+            Type::Int32 | Type::Enum => Element::Varint(Scalar::I32),
+            Type::Uint32 => Element::Varint(Scalar::U32),
+            Type::Int64 => Element::Varint(Scalar::I64),
+            Type::Uint64 => Element::Varint(Scalar::U64),
+            Type::Sint32 => Element::ZigZag(Scalar::I32),
+            Type::Sint64 => Element::ZigZag(Scalar::I64),
+            Type::String => Element::Text,
+            Type::Bytes => Element::Bytes,
+            Type::Message => Element::Message(at_of(descriptor.type_name())),
+            Type::Group => return Ok(None),
         };
-        // Maps are lists of entries on the wire.
-        let is_list = descriptor.is_list() || descriptor.is_map();
-        let (number, name) = (descriptor.number(), descriptor.name().to_string());
-        let default = match (is_list, element) {
-            (true, _) => element.no_elements(),
-            (false, Element::Message(_)) => Value::Absent,
-            (false, _) => value_of(&descriptor.default_value()),
+        // Maps are lists of entries, here as on the wire.
+        let is_list = descriptor.label() == Label::Repeated;
+        // Only proto2 says a default.
+        let said = descriptor.default_value.as_deref();
+        let default = match element {
+            _ if is_list => element.no_elements(),
+            Element::Message(_) => Value::Absent,
+            Element::Text => Value::Text(Cow::Owned(said.unwrap_or_default().to_string())),
+            Element::Bytes => bytes_value(Cow::Owned(said.unwrap_or_default().into())),
+            Element::Fixed(Scalar::F32 | Scalar::F64) => {
+                let number = said.map_or(Ok(0.0), str::parse);
+                Value::Float(number.map_err(|_error| wrong("default that is a number"))?)
+            }
+            _ if descriptor.r#type() == Type::Enum => {
+                Value::Int(named.number(descriptor.type_name(), said))
+            }
+            _ => {
+                let number = match said {
+                    None | Some("false") => Ok(0),
+                    Some("true") => Ok(1),
+                    Some(text) => text.parse().or_else(|_| text.parse().map(u64::cast_signed)),
+                };
+                Value::Int(number.map_err(|_error| wrong("default that is an integer"))?)
+            }
         };
-        Field { number, name, element, is_list, default }
+        Ok(Some(Field { number, name, element, is_list, default }))
     }
 }
 
@@ -125,27 +196,10 @@ impl Element {
         let scalar = match self {
             Element::Fixed(scalar) => scalar,
             Element::Varint(Scalar::U64) => Scalar::U64,
-            Element::Varint(_) | Element::ZigZag => Scalar::I64,
+            Element::Varint(_) | Element::ZigZag(_) => Scalar::I64,
             Element::Text | Element::Bytes | Element::Message(_) => return Value::List(Vec::new()),
         };
         Value::Numbers(Numbers { bytes: Cow::Borrowed(&[]), scalar, endian: Endian::Little })
-    }
-}
-
-/// The default of a field that is one value and no message; in proto2 the definition may say it.
-fn value_of(default: &prost_reflect::Value) -> Value<'static> {
-    use prost_reflect::Value as Default;
-    match default {
-        Default::Bool(value) => Value::Int(i64::from(*value)),
-        Default::I32(value) | Default::EnumNumber(value) => Value::Int(i64::from(*value)),
-        Default::I64(value) => Value::Int(*value),
-        Default::U32(value) => Value::Int(i64::from(*value)),
-        Default::U64(value) => Value::Int(*value as i64),
-        Default::F32(value) => Value::Float(f64::from(*value)),
-        Default::F64(value) => Value::Float(*value),
-        Default::String(value) => Value::Text(Cow::Owned(value.clone())),
-        Default::Bytes(value) => bytes_value(Cow::Owned(value.to_vec())),
-        Default::Message(_) | Default::List(_) | Default::Map(_) => Value::Absent,
     }
 }
 

@@ -1,8 +1,8 @@
 //! Protobuf bytes to values, by the descriptors that the log carries.
 //!
-//! The wire format of <https://protobuf.dev/programming-guides/encoding/>. The descriptors are
-//! linked by a library; the messages are walked here, because pictures and clouds can then stay
-//! where they lie and every limit is ours, neither of which a library's dynamic message offers.
+//! The wire format of <https://protobuf.dev/programming-guides/encoding/>. Messages are
+//! walked here, because pictures and clouds can then stay where they lie and every limit is ours,
+//! neither of which a library's dynamic message offers.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -45,7 +45,7 @@ impl Element {
     /// The wire type of one element.
     fn wire_type(self) -> u64 {
         match self {
-            Element::Varint(_) | Element::ZigZag => VARINT,
+            Element::Varint(_) | Element::ZigZag(_) => VARINT,
             Element::Fixed(scalar) if scalar.size() == 8 => EIGHT_BYTES,
             Element::Fixed(_) => FOUR_BYTES,
             Element::Text | Element::Bytes | Element::Message(_) => LENGTH,
@@ -54,7 +54,11 @@ impl Element {
 
     fn integer(self, varint: u64) -> i64 {
         match self {
-            Element::ZigZag => (varint >> 1) as i64 ^ -((varint & 1) as i64),
+            // Longer numbers than the type lose their upper bits.
+            Element::ZigZag(scalar) => {
+                let bits = if scalar == Scalar::I32 { varint & 0xffff_ffff } else { varint };
+                (bits >> 1) as i64 ^ -((bits & 1) as i64)
+            }
             Element::Varint(Scalar::Bool) => i64::from(varint != 0),
             Element::Varint(Scalar::I32) => i64::from(varint as i32),
             Element::Varint(Scalar::U32) => i64::from(varint as u32),
@@ -179,7 +183,7 @@ impl<'a> Decoding<'a> {
                     _ => Value::Int(scalar.read(bytes, Endian::Little) as i64),
                 }
             }
-            element @ (Element::Varint(_) | Element::ZigZag) => {
+            element @ (Element::Varint(_) | Element::ZigZag(_)) => {
                 let integer = element.integer(self.varint(at, end)?);
                 if let Value::Numbers(numbers) = value {
                     self.count(1, key_end)?;
