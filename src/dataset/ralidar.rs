@@ -7,7 +7,7 @@ use crate::{
     error::Result,
     frame::{LidarPixels, RadarPixels},
     log::{
-        cloud::Cloud,
+        cloud::{Cloud, CloudPoint},
         mapping::RADIAL_SPEED_FIELDS,
         signals::{self, Kind, Pose, RadarReturn},
         value::Struct,
@@ -29,10 +29,14 @@ pub fn lidar_pixels(
 ) -> Result<LidarPixels> {
     let cloud = Cloud::new(message)?;
     let [x, y, z] = cloud.xyz()?;
+    let camera_from_points = match &cloud.frame_from_points {
+        Some(pose) => camera_from_sensor.then(pose),
+        None => *camera_from_sensor,
+    };
     let mut nearest = Nearest::new(camera);
     for point in cloud.points() {
-        let sensor_m = DVec3::new(point.get(x), point.get(y), point.get(z));
-        let camera_m = camera_from_sensor.transform_point(sensor_m);
+        let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
+        let camera_m = camera_from_points.transform_point(point_m);
         nearest.add(camera_m, camera_m);
     }
     let mut pixels = LidarPixels::default();
@@ -84,13 +88,13 @@ fn radar_cloud(message: &Struct) -> Result<Vec<RadarReturn>> {
             what: format!("no radial speed: none of {}", RADIAL_SPEED_FIELDS.join(", ")),
         });
     };
-    Ok(cloud
-        .points()
-        .map(|point| RadarReturn {
-            position_m: DVec3::new(point.get(x), point.get(y), point.get(z)),
-            radial_speed_mps: point.get(speed),
-        })
-        .collect())
+    let returned = |point: CloudPoint| {
+        let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
+        let pose = &cloud.frame_from_points;
+        let position_m = pose.as_ref().map_or(point_m, |pose| pose.transform_point(point_m));
+        RadarReturn { position_m, radial_speed_mps: point.get(speed) }
+    };
+    Ok(cloud.points().map(returned).collect())
 }
 
 /// The nearest return of each pixel.

@@ -1,11 +1,16 @@
 //! Point clouds of any layout, read where they lie.
 //!
 //! `sensor_msgs/PointCloud2`: points of `point_step` bytes in rows of `row_step`, each field at
-//! its own offset with its own type. Nothing is assumed of the order, the padding or the types.
+//! its own offset with its own type. `foxglove.PointCloud`: points of `point_stride` bytes in one
+//! row, little-endian, placed in their frame by a pose. Nothing is assumed of the order, the
+//! padding or the types.
 
 use crate::{
     error::{Error, Result},
-    log::value::{Endian, Scalar, Struct},
+    log::{
+        signals::{self, Pose},
+        value::{Endian, Scalar, Struct, Value},
+    },
 };
 
 /// A field of every point.
@@ -21,6 +26,8 @@ pub struct CloudField {
 #[derive(Clone, Debug)]
 pub struct Cloud<'a> {
     pub fields: Vec<CloudField>,
+    /// Where its points sit in its frame, if they are not in that frame already.
+    pub frame_from_points: Option<Pose>,
     data: &'a [u8],
     endian: Endian,
     width: usize,
@@ -30,36 +37,45 @@ pub struct Cloud<'a> {
 }
 
 impl<'a> Cloud<'a> {
-    /// Read the layout of a `sensor_msgs/PointCloud2`.
+    /// Read the layout of a `sensor_msgs/PointCloud2` or a `foxglove.PointCloud`.
     ///
     /// # Errors
     ///
-    /// [`Error::Decode`] if a field does not lie inside a point, a type is unknown, or the data
-    /// is shorter than width, height and steps say.
-    pub fn new(message: &Struct<'a>) -> Result<Cloud<'a>> {
+    /// [`Error::Decode`] if a field does not lie inside a point, a type is unknown, the data is
+    /// shorter than width, height and steps say, or it ends inside a point.
+    pub fn new(message: &'a Struct) -> Result<Cloud<'a>> {
         let fail =
             |what: String| Error::Decode { schema: message.name.to_string(), offset: 0, what };
         let size = |field: &str| -> Result<usize> {
             usize::try_from(message.int(field)?)
                 .map_err(|_error| fail(format!("`{field}` is negative")))
         };
+        let data = message.bytes("data")?;
+        if message.get("point_stride").is_some() {
+            let point_step = size("point_stride")?;
+            if point_step == 0 || !data.len().is_multiple_of(point_step) {
+                let bytes = data.len();
+                return Err(fail(format!("{bytes} bytes are no points of {point_step} bytes")));
+            }
+            let pose = match message.get("pose") {
+                None | Some(Value::Absent) => None,
+                Some(_) => Some(signals::pose(message.part("pose")?)?),
+            };
+            return Ok(Cloud {
+                fields: fields(message, point_step, "type", foxglove_scalar)?,
+                frame_from_points: pose,
+                data,
+                endian: Endian::Little,
+                width: data.len() / point_step,
+                height: 1,
+                point_step,
+                row_step: data.len(),
+            });
+        }
         let endian = if message.int("is_bigendian")? == 0 { Endian::Little } else { Endian::Big };
         let (width, height) = (size("width")?, size("height")?);
         let (point_step, row_step) = (size("point_step")?, size("row_step")?);
-        let data = message.bytes("data")?;
-
-        let mut fields = Vec::new();
-        for part in message.parts("fields")? {
-            let (name, datatype) = (part.text("name")?.to_string(), part.int("datatype")?);
-            let scalar = scalar(datatype)
-                .ok_or_else(|| fail(format!("field `{name}` has unknown type {datatype}")))?;
-            let offset = usize::try_from(part.int("offset")?)
-                .map_err(|_error| fail(format!("field `{name}` has a negative offset")))?;
-            if offset.checked_add(scalar.size()).is_none_or(|end| end > point_step) {
-                return Err(fail(format!("field `{name}` does not lie inside a point")));
-            }
-            fields.push(CloudField { name, offset, scalar });
-        }
+        let fields = fields(message, point_step, "datatype", scalar)?;
 
         let rows_end = height.saturating_sub(1).checked_mul(row_step);
         let last_row = width.checked_mul(point_step);
@@ -71,7 +87,8 @@ impl<'a> Cloud<'a> {
             );
             return Err(fail(what));
         }
-        Ok(Cloud { fields, data, endian, width, height, point_step, row_step })
+        let frame_from_points = None;
+        Ok(Cloud { fields, frame_from_points, data, endian, width, height, point_step, row_step })
     }
 
     /// The field of that name, upper or lower case.
@@ -90,7 +107,7 @@ impl<'a> Cloud<'a> {
             _ => {
                 let have: Vec<_> = self.fields.iter().map(|field| field.name.as_str()).collect();
                 let what = format!("no x, y, z; its fields are {}", have.join(", "));
-                Err(Error::Decode { schema: "sensor_msgs/PointCloud2".into(), offset: 0, what })
+                Err(Error::Decode { schema: "a point cloud".into(), offset: 0, what })
             }
         }
     }
@@ -120,6 +137,43 @@ impl CloudPoint<'_> {
     pub fn get(&self, field: &CloudField) -> f64 {
         field.scalar.read(&self.bytes[field.offset..], self.endian)
     }
+}
+
+/// The fields of every point; `type_field` names the number that stands for the type.
+fn fields(
+    message: &Struct,
+    point_step: usize,
+    type_field: &str,
+    scalar: fn(i64) -> Option<Scalar>,
+) -> Result<Vec<CloudField>> {
+    let fail = |what: String| Error::Decode { schema: message.name.to_string(), offset: 0, what };
+    let field = |part: &Struct| {
+        let (name, datatype) = (part.text("name")?.to_string(), part.int(type_field)?);
+        let scalar = scalar(datatype)
+            .ok_or_else(|| fail(format!("field `{name}` has unknown type {datatype}")))?;
+        let offset = usize::try_from(part.int("offset")?)
+            .map_err(|_error| fail(format!("field `{name}` has a negative offset")))?;
+        if offset.checked_add(scalar.size()).is_none_or(|end| end > point_step) {
+            return Err(fail(format!("field `{name}` does not lie inside a point")));
+        }
+        Ok(CloudField { name, offset, scalar })
+    };
+    message.parts("fields")?.map(field).collect()
+}
+
+/// `foxglove.PackedElementField.NumericType`.
+fn foxglove_scalar(datatype: i64) -> Option<Scalar> {
+    Some(match datatype {
+        1 => Scalar::U8,
+        2 => Scalar::I8,
+        3 => Scalar::U16,
+        4 => Scalar::I16,
+        5 => Scalar::U32,
+        6 => Scalar::I32,
+        7 => Scalar::F32,
+        8 => Scalar::F64,
+        _ => return None,
+    })
 }
 
 /// `sensor_msgs/PointField` datatypes.

@@ -5,7 +5,7 @@
 use crate::{
     error::{Error, Result},
     log::{
-        cdr, idl,
+        cdr, descriptors, idl, json, protobuf,
         reader::Channel,
         ros1,
         schema::{self, Schema},
@@ -21,6 +21,10 @@ pub enum Decoder {
     Cdr(Schema),
     /// ROS 1: `ros1msg` definitions, messages in its own serialisation.
     Ros1(Schema),
+    /// Protobuf: a descriptor set as definition.
+    Protobuf(descriptors::Schema),
+    /// JSON, with a JSON Schema or an empty one.
+    Json(json::Schema),
 }
 
 impl Decoder {
@@ -42,6 +46,12 @@ impl Decoder {
             ("ros1msg", "ros1") => {
                 schema::parse_ros1(&record.name, text()?).map(Decoder::Ros1).map_err(said)
             }
+            ("protobuf", "protobuf") => {
+                descriptors::parse(&record.name, &record.data).map(Decoder::Protobuf)
+            }
+            ("jsonschema" | "", "json") => {
+                json::parse(&record.name, &record.data).map(Decoder::Json)
+            }
             _ => Err(format!("`{definition}` definitions of `{message}` messages are not read")),
         }
     }
@@ -55,6 +65,8 @@ impl Decoder {
         match self {
             Decoder::Cdr(schema) => cdr::decode(schema, message),
             Decoder::Ros1(schema) => ros1::decode(schema, message),
+            Decoder::Protobuf(schema) => protobuf::decode(schema, message),
+            Decoder::Json(schema) => json::decode(schema, message, None),
         }
     }
 
@@ -65,11 +77,22 @@ impl Decoder {
     /// As [`decode`](Decoder::decode); also if the message has no header.
     pub fn header(&self, message: &[u8]) -> Result<Header> {
         match self {
+            // Foxglove's messages begin with the parts of a header. Nothing large is copied.
+            Decoder::Cdr(schema)
+                if schema.types[0].fields.iter().any(|f| f.name == "timestamp") =>
+            {
+                signals::header(&cdr::decode(schema, message)?)
+            }
             Decoder::Cdr(schema) => {
                 signals::header_of_first_field(&cdr::decode_first_field(schema, message)?)
             }
             Decoder::Ros1(schema) => {
                 signals::header_of_first_field(&ros1::decode_first_field(schema, message)?)
+            }
+            Decoder::Protobuf(schema) => signals::header(&protobuf::decode(schema, message)?),
+            Decoder::Json(schema) => {
+                let fields = ["header", "timestamp", "frame_id"];
+                signals::header(&json::decode(schema, message, Some(&fields))?)
             }
         }
     }

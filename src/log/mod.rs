@@ -1,8 +1,8 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (values) -> signals (samples)
-//!           schema, idl: definitions      wire, cdr, ros1: messages
+//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
+//!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -25,8 +25,11 @@ pub mod idl;
 pub mod wire;
 pub mod cdr;
 pub mod ros1;
-pub mod cloud;
+pub mod descriptors;
+pub mod protobuf;
+pub mod json;
 pub mod signals;
+pub mod cloud;
 pub mod decoder;
 pub mod transforms;
 pub mod recording;

@@ -37,7 +37,13 @@ pub enum Kind {
 impl Kind {
     /// The kind of a message type, by its name.
     pub fn of(schema_name: &str) -> Option<Kind> {
-        Some(match short_name(schema_name).as_str() {
+        let name = short_name(schema_name);
+        let foxglove =
+            name.strip_prefix("foxglove.").or_else(|| name.strip_prefix("foxglove_msgs/"));
+        if let Some(name) = foxglove {
+            return Kind::of_foxglove(name);
+        }
+        Some(match name.as_str() {
             "sensor_msgs/CompressedImage" => Kind::CompressedImage,
             "sensor_msgs/Image" => Kind::Image,
             "sensor_msgs/CameraInfo" => Kind::CameraInfo,
@@ -58,9 +64,25 @@ impl Kind {
             _ => return None,
         })
     }
+
+    /// The kinds of Foxglove's well-known schemas, <https://docs.foxglove.dev/docs/sdk/schemas>:
+    /// the same names in protobuf and JSON (`foxglove.X`) and in ROS (`foxglove_msgs/msg/X`).
+    fn of_foxglove(name: &str) -> Option<Kind> {
+        Some(match name {
+            "CompressedImage" => Kind::CompressedImage,
+            "RawImage" => Kind::Image,
+            "CameraCalibration" => Kind::CameraInfo,
+            "PointCloud" => Kind::PointCloud,
+            "Odometry" => Kind::Odometry,
+            "PoseInFrame" => Kind::Pose,
+            "PosesInFrame" => Kind::Path,
+            "FrameTransform" | "FrameTransforms" => Kind::Transforms,
+            _ => return None,
+        })
+    }
 }
 
-/// `std_msgs/Header`.
+/// `std_msgs/Header`, or the time and the frame that a Foxglove message begins with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Since the Unix epoch (or the simulator's start).
@@ -140,25 +162,41 @@ impl Encoding {
 /// The header of a message that has one, or of a value that is one.
 pub fn header(value: &Struct) -> Result<Header> {
     let header = value.part("header").unwrap_or(value);
-    let stamp = header.part("stamp")?;
-    // ROS 2 calls it nanosec, ROS 1 nsec.
-    let nanos = stamp.int("nanosec").or_else(|_| stamp.int("nsec"))?;
-    let stamp_ns = stamp.int("sec")?.saturating_mul(1_000_000_000).saturating_add(nanos);
-    Ok(Header { stamp_ns, frame_id: header.text("frame_id")?.trim_start_matches('/').to_string() })
+    // A transform of Foxglove's says of which two frames it is, and the parent is the one it is in.
+    let frame_id = header.text("parent_frame_id").or_else(|_| header.text("frame_id"))?;
+    let stamp_field = if header.get("timestamp").is_some() { "timestamp" } else { "stamp" };
+    let stamp_ns = header.optional_part(stamp_field)?.map(nanoseconds).transpose()?;
+    let frame_id = frame_id.trim_start_matches('/').to_string();
+    Ok(Header { stamp_ns: stamp_ns.unwrap_or_default(), frame_id })
 }
 
-/// `nav_msgs/Odometry`.
+/// An instant: ROS 2 calls its parts sec and nanosec, ROS 1 and JSON sec and nsec, protobuf
+/// seconds and nanos.
+fn nanoseconds(stamp: &Struct) -> Result<i64> {
+    let seconds = stamp.int("sec").or_else(|_| stamp.int("seconds"))?;
+    let nanos = ["nsec", "nanos"].iter().find_map(|name| stamp.int(name).ok());
+    let nanos = nanos.map_or_else(|| stamp.int("nanosec"), Ok)?;
+    Ok(seconds.saturating_mul(1_000_000_000).saturating_add(nanos))
+}
+
+/// `nav_msgs/Odometry` or `foxglove.Odometry`.
 pub fn odometry(message: &Struct) -> Result<Odometry> {
+    if message.get("linear_velocity").is_some() {
+        let velocity = message.optional_part("linear_velocity")?.map(vector).transpose()?;
+        let velocity_mps = velocity.unwrap_or(DVec3::ZERO);
+        return Ok(Odometry { pose: pose(message.part("pose")?)?, velocity_mps });
+    }
     let velocity_mps = vector(message.part("twist")?.part("twist")?.part("linear")?)?;
     Ok(Odometry { pose: pose(message.part("pose")?.part("pose")?)?, velocity_mps })
 }
 
-/// `nav_msgs/Odometry`: the frame that the pose is of.
+/// `nav_msgs/Odometry` or `foxglove.Odometry`: the frame that the pose is of.
 pub fn child_frame<'m>(message: &'m Struct) -> Result<&'m str> {
-    Ok(message.text("child_frame_id")?.trim_start_matches('/'))
+    let frame = message.text("child_frame_id").or_else(|_| message.text("body_frame_id"))?;
+    Ok(frame.trim_start_matches('/'))
 }
 
-/// `geometry_msgs/PoseStamped`, with or without covariance.
+/// `geometry_msgs/PoseStamped`, with or without covariance, or `foxglove.PoseInFrame`.
 pub fn stamped_pose(message: &Struct) -> Result<Pose> {
     let part = message.part("pose")?;
     pose(part.part("pose").unwrap_or(part))
@@ -176,21 +214,26 @@ pub fn angular_velocity(message: &Struct) -> Result<DVec3> {
     vector(message.part("angular_velocity")?)
 }
 
-/// `nav_msgs/Path`: positions in the frame of its header.
+/// `nav_msgs/Path` or `foxglove.PosesInFrame`: positions in the frame of its header.
 pub fn path(message: &Struct) -> Result<Vec<DVec3>> {
-    message.parts("poses")?.map(|stamped| Ok(stamped_pose(stamped)?.position_m)).collect()
+    let one = |part: &Struct| match part.get("pose") {
+        Some(_) => stamped_pose(part),
+        None => pose(part),
+    };
+    message.parts("poses")?.map(|part| Ok(one(part)?.position_m)).collect()
 }
 
-/// `tf2_msgs/TFMessage`: parent frame, stamp, child frame, `parent_from_child`.
+/// `tf2_msgs/TFMessage`, `foxglove.FrameTransforms` or `foxglove.FrameTransform`: parent frame,
+/// stamp, child frame, `parent_from_child`.
 pub fn transforms(message: &Struct) -> Result<Vec<(Header, String, Pose)>> {
     let stamped = |part: &Struct| {
-        let transform = part.part("transform")?;
-        let pose = Pose {
-            position_m: vector(transform.part("translation")?)?,
-            rotation: quaternion(transform.part("rotation")?)?,
-        };
+        let transform = part.part("transform").unwrap_or(part);
+        let pose = placed(transform, "translation", "rotation")?;
         Ok((header(part)?, child_frame(part)?.to_string(), pose))
     };
+    if message.get("parent_frame_id").is_some() {
+        return Ok(vec![stamped(message)?]);
+    }
     message.parts("transforms")?.map(stamped).collect()
 }
 
@@ -216,9 +259,9 @@ pub fn carla_status(message: &Struct) -> Result<CarlaStatus> {
     Ok(CarlaStatus { speed_mps: message.number("velocity")?, control })
 }
 
-/// `sensor_msgs/CameraInfo`; the intrinsics are those of the picture of its width and height.
+/// `sensor_msgs/CameraInfo` or `foxglove.CameraCalibration`; the intrinsics are those of the picture of its width and height.
 pub fn camera_info(message: &Struct) -> Result<Camera> {
-    // ROS 2 writes k and d, ROS 1 K and D.
+    // ROS 2 writes k and d, ROS 1 and Foxglove K and D.
     let numbers = |lower: &str, upper: &str| -> Result<Vec<f64>> {
         Ok(message.numbers(lower).or_else(|_| message.numbers(upper))?.iter().collect())
     };
@@ -287,8 +330,8 @@ pub fn radar_tracks(message: &Struct) -> Result<Vec<RadarReturn>> {
     message.parts("tracks")?.map(track).collect()
 }
 
-/// `sensor_msgs/CompressedImage` or `sensor_msgs/Image`.
-pub fn picture<'a>(kind: Kind, message: &Struct<'a>) -> Result<Picture<'a>> {
+/// `sensor_msgs/CompressedImage`, `sensor_msgs/Image` or `foxglove.RawImage`.
+pub fn picture<'m>(kind: Kind, message: &'m Struct) -> Result<Picture<'m>> {
     let data = message.bytes("data")?;
     if kind == Kind::CompressedImage {
         return Ok(Picture::Compressed { data });
@@ -323,10 +366,18 @@ fn vector(part: &Struct) -> Result<DVec3> {
     Ok(DVec3::new(part.number("x")?, part.number("y")?, part.number("z")?))
 }
 
-fn pose(part: &Struct) -> Result<Pose> {
+/// `geometry_msgs/Pose` or `foxglove.Pose`.
+pub fn pose(part: &Struct) -> Result<Pose> {
+    placed(part, "position", "orientation")
+}
+
+/// What a message leaves out does not move or turn anything.
+fn placed(part: &Struct, position: &str, rotation: &str) -> Result<Pose> {
+    let position_m = part.optional_part(position)?.map(vector).transpose()?;
+    let rotation = part.optional_part(rotation)?.map(quaternion).transpose()?;
     Ok(Pose {
-        position_m: vector(part.part("position")?)?,
-        rotation: quaternion(part.part("orientation")?)?,
+        position_m: position_m.unwrap_or(DVec3::ZERO),
+        rotation: rotation.unwrap_or(DQuat::IDENTITY),
     })
 }
 

@@ -47,9 +47,12 @@ impl Pose {
 #[derive(Clone, Debug)]
 struct Link {
     parent: String,
-    /// `parent_from_child` by stamp; a single one holds for all times.
+    /// `parent_from_child` by stamp.
     poses: Vec<(i64, Pose)>,
     is_static: bool,
+    /// All poses are the same: a mount that was told again and again, or once, on a topic that
+    /// does not say that it is static. It holds at all times.
+    is_fixed: bool,
 }
 
 /// All transforms of a log.
@@ -71,6 +74,7 @@ impl TransformTree {
             parent: header.frame_id.clone(),
             poses: Vec::new(),
             is_static,
+            is_fixed: false,
         });
         if link.parent != header.frame_id {
             return;
@@ -85,6 +89,7 @@ impl TransformTree {
     pub fn finish(&mut self) {
         for link in self.links.values_mut() {
             link.poses.sort_by_key(|(stamp_ns, _)| *stamp_ns);
+            link.is_fixed = link.poses.windows(2).all(|pair| pair[0].1 == pair[1].1);
         }
     }
 
@@ -138,7 +143,7 @@ impl TransformTree {
 
 impl Link {
     fn at(&self, stamp_ns: i64) -> Option<Pose> {
-        if self.is_static {
+        if self.is_static || self.is_fixed {
             return self.poses.first().map(|(_, pose)| *pose);
         }
         let after = self.poses.partition_point(|(stamp, _)| *stamp < stamp_ns);

@@ -1,7 +1,7 @@
 //! What a decoded message holds, whatever its encoding was.
 //!
-//! Arrays of numbers and bytes borrow from the message, so a picture or a cloud is not copied to
-//! be looked at.
+//! Arrays of numbers and bytes borrow from the message where it has them as they are, so a picture
+//! or a cloud is not copied to be looked at.
 
 use std::borrow::Cow;
 
@@ -68,10 +68,10 @@ pub enum Endian {
     Big,
 }
 
-/// An array of numbers as it lies in the message.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// An array of numbers as it lies in the message, or as it would lie there if it is text.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Numbers<'a> {
-    pub bytes: &'a [u8],
+    pub bytes: Cow<'a, [u8]>,
     pub scalar: Scalar,
     pub endian: Endian,
 }
@@ -85,7 +85,7 @@ impl<'a> Numbers<'a> {
         self.bytes.is_empty()
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = f64> + use<'a> {
+    pub fn iter(&self) -> impl Iterator<Item = f64> {
         let (scalar, endian) = (self.scalar, self.endian);
         self.bytes.chunks_exact(scalar.size()).map(move |bytes| scalar.read(bytes, endian))
     }
@@ -100,6 +100,8 @@ pub enum Value<'a> {
     Numbers(Numbers<'a>),
     List(Vec<Value<'a>>),
     Struct(Struct<'a>),
+    /// A part that the definition has and the message leaves out.
+    Absent,
 }
 
 /// A decoded message or part of one.
@@ -158,18 +160,34 @@ impl<'a> Struct<'a> {
         }
     }
 
-    /// An array of numbers.
-    pub fn numbers(&self, field: &str) -> Result<Numbers<'a>> {
+    /// A part; `None` if the message leaves it out although its definition has it.
+    pub fn optional_part(&self, field: &str) -> Result<Option<&Struct<'a>>> {
         match self.get(field) {
-            Some(Value::Numbers(numbers)) => Ok(*numbers),
+            Some(Value::Absent) => Ok(None),
+            _ => self.part(field).map(Some),
+        }
+    }
+
+    /// An array of numbers.
+    pub fn numbers(&self, field: &str) -> Result<Numbers<'_>> {
+        match self.get(field) {
+            Some(Value::Numbers(Numbers { bytes, scalar, endian })) => {
+                let (bytes, scalar, endian) = (Cow::Borrowed(&**bytes), *scalar, *endian);
+                Ok(Numbers { bytes, scalar, endian })
+            }
+            // Text says of an empty array not what it would hold.
+            Some(Value::List(list)) if list.is_empty() => {
+                let (bytes, scalar) = (Cow::Borrowed(&[][..]), Scalar::F64);
+                Ok(Numbers { bytes, scalar, endian: Endian::Little })
+            }
             _ => Err(self.expect(field, "array of numbers")),
         }
     }
 
     /// An array of bytes.
-    pub fn bytes(&self, field: &str) -> Result<&'a [u8]> {
+    pub fn bytes(&self, field: &str) -> Result<&[u8]> {
         match self.get(field) {
-            Some(Value::Numbers(numbers)) if numbers.scalar.size() == 1 => Ok(numbers.bytes),
+            Some(Value::Numbers(numbers)) if numbers.scalar.size() == 1 => Ok(&numbers.bytes),
             _ => Err(self.expect(field, "array of bytes")),
         }
     }

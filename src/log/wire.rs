@@ -117,6 +117,7 @@ impl<'a> Cursor<'a> {
                 Some(len) => self.take(len)?,
                 None => return Err(self.fail("an array longer than the memory")),
             };
+            let bytes = Cow::Borrowed(bytes);
             return Ok(Value::Numbers(Numbers { bytes, scalar, endian: self.layout.endian }));
         }
         let left = self.data.len().saturating_sub(self.at);
@@ -160,6 +161,7 @@ impl<'a> Cursor<'a> {
                     Some(len) => self.take(len)?,
                     None => return Err(self.fail("a string longer than the memory")),
                 };
+                let bytes = Cow::Borrowed(bytes);
                 let numbers = Numbers { bytes, scalar: Scalar::U16, endian: self.layout.endian };
                 let units: Vec<u16> = numbers.iter().map(|unit| unit as u16).collect();
                 Ok(Value::Text(Cow::Owned(String::from_utf16_lossy(&units))))
