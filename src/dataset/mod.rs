@@ -1,4 +1,11 @@
 //! Logs in, batches out.
+//!
+//! ```text
+//! samples -> ego (pose, velocity) -> future, route, control   labels
+//!         -> align (grid) -> drive (frames: picture, ralidar) -> columns -> shard
+//! ingest: one log after the other, each committed alone; split, manifest, summary, inspect
+//! open (which frames train, which judge) -> order -> sample -> batch, by loader
+//! ```
 
 pub mod dead_reckoning;
 pub mod ego;

@@ -1,9 +1,10 @@
 //! Questions to the shards and to `episodes.parquet`, asked through polars.
 //!
 //! The shards and their split are those of the manifest: what a killed ingest left behind does
-//! not count, and a dataset may lie below a folder that looks like a hive partition. Only scalar columns and the velocity are read: that a
-//! frame has lidar or radar is known from its skew, which is null exactly where they are. Polars
-//! still looks at the types of all columns, so it has to be built with half floats.
+//! not count, and a dataset may lie below a folder that looks like a hive partition. Only scalar
+//! columns and the velocity are read: that a frame has lidar or radar is known from its skew,
+//! which is null exactly where they are. Polars still looks at the types of all columns, so it has
+//! to be built with half floats.
 
 use std::{
     collections::BTreeMap,
