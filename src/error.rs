@@ -58,6 +58,7 @@ pub enum Error {
     Diverged { step: u64, term: String },
 
     /// A tensor operation failed: shapes, types or the device.
+    #[cfg(feature = "learning")]
     #[error(transparent)]
     Tensor(#[from] candle_core::Error),
 
@@ -78,6 +79,7 @@ pub enum Error {
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },
 
     /// A query over the dataset failed.
+    #[cfg(feature = "learning")]
     #[error("query over {}: {source}", path.display())]
     Query { path: PathBuf, source: polars::error::PolarsError },
 
@@ -106,6 +108,7 @@ impl Error {
     }
 
     /// For `map_err` on polars calls.
+    #[cfg(feature = "learning")]
     pub fn query(path: impl AsRef<Path>) -> impl FnOnce(polars::error::PolarsError) -> Self {
         let path = path.as_ref().to_path_buf();
         move |source| Error::Query { path, source }

@@ -21,7 +21,10 @@ pub mod log;
 pub mod policy;
 pub mod dataset;
 pub mod sim;
+#[cfg(feature = "learning")]
 pub mod model;
+#[cfg(feature = "learning")]
 pub mod stats;
+#[cfg(feature = "learning")]
 pub mod eval;
 pub mod cli;

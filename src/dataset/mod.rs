@@ -26,5 +26,7 @@ pub mod inspect;
 pub mod open;
 pub mod order;
 pub mod sample;
+#[cfg(feature = "learning")]
 pub mod batch;
+#[cfg(feature = "learning")]
 pub mod loader;

@@ -17,15 +17,25 @@ mod logs;
 mod alignment;
 mod ingest;
 mod real_drive;
+#[cfg(feature = "learning")]
 mod evaluation;
+#[cfg(feature = "learning")]
 mod evaluation_report;
+#[cfg(feature = "learning")]
 mod samples;
+#[cfg(feature = "learning")]
 mod losses;
+#[cfg(feature = "learning")]
 mod network;
+#[cfg(feature = "learning")]
 mod training;
+#[cfg(feature = "learning")]
 mod train_cli;
+#[cfg(feature = "learning")]
 mod run_schema;
 mod encoding;
 mod recording;
+#[cfg(feature = "learning")]
 mod stats;
+#[cfg(feature = "learning")]
 mod whole_path;
