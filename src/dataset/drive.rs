@@ -11,18 +11,18 @@ use crate::{
         control::Controls,
         ego::EgoTrack,
         future::future,
-        picture,
+        picture::{self, Rgb},
         ralidar::{lidar_pixels, radar_pixels},
         route::{Path, command},
     },
     drops::Reason,
     error::Result,
-    frame::{Conditions, Frame, Route, Skew},
+    frame::{Conditions, Frame, LidarPixels, RadarPixels, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
         mapping::{Mapping, PoseSource},
-        profile::Profile,
-        reader::Place,
+        profile::{CameraRule, Profile},
+        reader::{Place, SegmentReader},
         recording::{Recording, Series, Stamped, Topic, mapping_error},
         signals::{self, Pose},
     },
@@ -37,12 +37,14 @@ pub struct Drive {
     pub profile: Profile,
     pub grid: Grid,
     pub conditions: Conditions,
-    /// Intrinsics of the recorded picture, where the log has them.
-    pub camera: Option<Camera>,
+    /// Intrinsics of the stored picture, where the log has them.
+    pub stored_camera: Option<Camera>,
     /// What was assumed, chosen or found, for people.
     pub notes: Vec<String>,
     /// Sensors that the log has and frames will not: each says why.
     pub left_out: Vec<String>,
+    /// Width and height of the recorded pictures.
+    picture_size: (usize, usize),
     controls: Controls,
     track: EgoTrack,
     driven: Path,
@@ -60,8 +62,22 @@ struct Sensor {
     optical_from_camera: Pose,
 }
 
-/// A JPEG and the camera that would have taken it.
-type StoredPicture = (Vec<u8>, Option<Camera>);
+/// Which signal a large message belongs to.
+#[derive(Clone, Copy, Debug)]
+enum Signal {
+    Camera,
+    Lidar,
+    Radar,
+}
+
+/// What a large message shows, or why it shows nothing.
+#[derive(Debug)]
+enum Sensed {
+    /// JPEG as stored.
+    Picture(Result<Vec<u8>, String>),
+    Lidar(Result<LidarPixels, String>),
+    Radar(Result<RadarPixels, String>),
+}
 
 /// What became of a tick.
 #[derive(Debug)]
@@ -165,6 +181,9 @@ impl Drive {
                 .collect(),
             _ => Vec::new(),
         };
+        let picture_size = picture_size(&recording, camera_topic)?;
+        let stored = |camera: &Camera| stored_camera(camera, picture_size, &profile.camera);
+        let stored_camera = camera.as_ref().map(stored).transpose()?;
         let conditions = conditions(&recording, profile);
         let driven = Path::driven(&track);
         let profile = profile.clone();
@@ -173,7 +192,8 @@ impl Drive {
             profile,
             grid,
             conditions,
-            camera,
+            stored_camera,
+            picture_size,
             notes,
             left_out,
             controls,
@@ -187,13 +207,8 @@ impl Drive {
     }
 
     /// What is worth keeping beside the frames.
-    ///
-    /// # Errors
-    ///
-    /// If the profile's crop does not lie inside the picture.
-    pub fn calibration(&self) -> Result<Calibration> {
-        let stored = |camera: &Camera| self.stored_camera(camera, camera.width, camera.height);
-        Ok(Calibration { camera: self.camera.as_ref().map(stored).transpose()? })
+    pub fn calibration(&self) -> Calibration {
+        Calibration { camera: self.stored_camera.clone() }
     }
 
     /// Distance driven from the first to the last tick, metres, seen from above.
@@ -207,75 +222,80 @@ impl Drive {
     ///
     /// # Errors
     ///
-    /// If the log cannot be read any more, or the profile's crop does not fit its pictures.
+    /// If the log cannot be read any more.
     pub fn frames(&self, ticks: &[Tick]) -> Result<Vec<Made>> {
-        let messages = self.fetch(ticks)?;
-        ticks.iter().map(|tick| self.frame(tick, &messages)).collect()
+        let sensed = self.sense(ticks)?;
+        Ok(ticks.iter().map(|tick| self.frame(tick, &sensed)).collect())
     }
 
-    /// The messages that some ticks need, each segment of the log read once.
-    fn fetch(&self, ticks: &[Tick]) -> Result<BTreeMap<(u32, u32), Vec<u8>>> {
-        let mut wanted: BTreeMap<u32, Vec<Place>> = BTreeMap::new();
+    /// What the pictures and clouds of some ticks show, by the place of their messages, each of
+    /// which is read, decoded and brought down to what is stored once, in the order of the file.
+    fn sense(&self, ticks: &[Tick]) -> Result<BTreeMap<Place, Sensed>> {
+        let mut wanted = BTreeMap::new();
         for tick in ticks {
-            let heavy = [Some(&tick.image), tick.lidar.as_ref(), tick.radar.as_ref()];
-            for sample in heavy.into_iter().flatten() {
-                wanted.entry(sample.value.segment).or_default().push(sample.value);
+            wanted.insert(tick.image.value, (Signal::Camera, tick.image.stamp_ns));
+            for (signal, sample) in [(Signal::Lidar, &tick.lidar), (Signal::Radar, &tick.radar)] {
+                wanted.extend(sample.as_ref().map(|s| (s.value, (signal, s.stamp_ns))));
             }
         }
-        let mut messages = BTreeMap::new();
-        for (segment, places) in wanted {
-            let bytes = self.recording.log.segment(segment)?;
-            for place in places {
-                let (start, end) = (place.start as usize, (place.start + place.len) as usize);
-                messages.insert((place.segment, place.start), bytes[start..end].to_vec());
-            }
+        let mut reader = SegmentReader::new(&self.recording.log);
+        let mut sensed = BTreeMap::new();
+        for (place, (signal, stamp_ns)) in wanted {
+            let message = reader.message(&place)?;
+            let shown = match signal {
+                Signal::Camera => Sensed::Picture(self.picture(message)),
+                Signal::Lidar => Sensed::Lidar(self.project(
+                    &self.lidar,
+                    message,
+                    stamp_ns,
+                    |topic, message, pose, camera| {
+                        lidar_pixels(&topic.decode(message)?, pose, camera)
+                    },
+                )),
+                Signal::Radar => Sensed::Radar(self.project(
+                    &self.radar,
+                    message,
+                    stamp_ns,
+                    |topic, message, pose, camera| {
+                        radar_pixels(topic.kind, &topic.decode(message)?, pose, camera)
+                    },
+                )),
+            };
+            sensed.insert(place, shown);
         }
-        Ok(messages)
+        Ok(sensed)
     }
 
-    fn frame(&self, tick: &Tick, messages: &BTreeMap<(u32, u32), Vec<u8>>) -> Result<Made> {
-        let bytes = |place: &Place| &messages[&(place.segment, place.start)];
+    fn frame(&self, tick: &Tick, sensed: &BTreeMap<Place, Sensed>) -> Made {
         let mut damaged = Vec::new();
-        let (image, camera) = match self.image(bytes(&tick.image.value))? {
-            Ok(image) => image,
-            Err(why) => {
-                return Ok(Made {
-                    frame: Err((Reason::ImageDamaged, tick.stamp_ns, why)),
-                    damaged,
-                });
+        let image = match &sensed[&tick.image.value] {
+            Sensed::Picture(Ok(jpeg)) => jpeg.clone(),
+            Sensed::Picture(Err(why)) => {
+                let frame = Err((Reason::ImageDamaged, tick.stamp_ns, why.clone()));
+                return Made { frame, damaged };
             }
+            Sensed::Lidar(_) | Sensed::Radar(_) => unreachable!("the image is the camera's"),
         };
-        let mut project = |sensor: &Option<Sensor>, sample: &Option<Stamped<Place>>| {
-            let (sensor, sample) = (sensor.as_ref()?, sample.as_ref()?);
-            let topic = &self.recording.topics[&sensor.topic];
-            let camera_frame = &self.recording.topics[self.mapping.camera.as_ref()?].frame_id;
-            let pose =
-                self.recording.transforms.lookup(camera_frame, &topic.frame_id, sample.stamp_ns);
-            match pose {
-                Ok(pose) => {
-                    Some((topic, sensor.optical_from_camera.then(&pose), bytes(&sample.value)))
-                }
-                Err(why) => {
-                    damaged.push((sensor.topic.clone(), why));
-                    None
-                }
+        let mut keep = |sensor: &Option<Sensor>, why: &String| {
+            let topic = sensor.as_ref().map(|sensor| sensor.topic.clone()).unwrap_or_default();
+            damaged.push((topic, why.clone()));
+        };
+        let lidar = match tick.lidar.as_ref().map(|sample| &sensed[&sample.value]) {
+            Some(Sensed::Lidar(Ok(pixels))) => Some(pixels.clone()),
+            Some(Sensed::Lidar(Err(why))) => {
+                keep(&self.lidar, why);
+                None
             }
+            _ => None,
         };
-        let lidar = project(&self.lidar, &tick.lidar);
-        let radar = project(&self.radar, &tick.radar);
-        let mut keep = |topic: &Topic, error: crate::error::Error| {
-            damaged.push((topic.name.clone(), error.to_string()));
+        let radar = match tick.radar.as_ref().map(|sample| &sensed[&sample.value]) {
+            Some(Sensed::Radar(Ok(pixels))) => Some(pixels.clone()),
+            Some(Sensed::Radar(Err(why))) => {
+                keep(&self.radar, why);
+                None
+            }
+            _ => None,
         };
-        let lidar = lidar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
-            let cloud = topic.decode(bytes);
-            let pixels = cloud.and_then(|cloud| lidar_pixels(&cloud, &pose, camera));
-            pixels.map_err(|error| keep(topic, error)).ok()
-        });
-        let radar = radar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
-            let returns = topic.decode(bytes);
-            let pixels = returns.and_then(|r| radar_pixels(topic.kind, &r, &pose, camera));
-            pixels.map_err(|error| keep(topic, error)).ok()
-        });
 
         let skew = |stamp_ns: i64| (stamp_ns - tick.stamp_ns) as i32;
         let skew = Skew {
@@ -304,36 +324,44 @@ impl Drive {
             speed_limit_mps: None,
             perturbed: self.controls.is_perturbed(tick.control.as_ref()),
         };
-        Ok(Made { frame: Ok(Box::new(frame)), damaged })
+        Made { frame: Ok(Box::new(frame)), damaged }
     }
 
-    /// The picture as it is stored; the inner error says what is wrong with the recorded one.
-    fn image(&self, bytes: &[u8]) -> Result<Result<StoredPicture, String>> {
-        let Some(topic) = self.mapping.camera.as_ref().and_then(|n| self.recording.topics.get(n))
-        else {
-            return Ok(Err("no camera".to_string()));
-        };
-        let message = topic.decode(bytes);
-        let rgb = message
-            .and_then(|message| Ok(picture::decode(&signals::picture(topic.kind, &message)?)))
-            .unwrap_or_else(|error| Err(error.to_string()));
-        let rgb = match rgb {
-            Ok(rgb) => rgb,
-            Err(why) => return Ok(Err(why)),
-        };
-        let camera = self.camera.as_ref();
-        let camera = camera.map(|c| self.stored_camera(c, rgb.width, rgb.height)).transpose()?;
-        Ok(picture::stored(&rgb, &self.profile.camera).map(|jpeg| (jpeg, camera)))
+    /// The picture of a message as it is stored, or what is wrong with it.
+    fn picture(&self, message: &[u8]) -> Result<Vec<u8>, String> {
+        let rgb = recorded_picture(self.camera_topic(), message)?;
+        if (rgb.width, rgb.height) != self.picture_size {
+            let (width, height) = self.picture_size;
+            return Err(format!(
+                "{} x {} pixels, where the first picture of the drive has {width} x {height}",
+                rgb.width, rgb.height
+            ));
+        }
+        picture::stored(&rgb, &self.profile.camera)
     }
 
-    /// The camera of the stored picture, when the recorded one has this size.
-    fn stored_camera(&self, camera: &Camera, width: usize, height: usize) -> Result<Camera> {
-        // Calibrated at another resolution than the pictures have: binning, or scaling on the way.
-        let all = Crop { x: 0, y: 0, width: camera.width, height: camera.height };
-        let recorded = camera.cropped_and_scaled(all, width, height)?;
-        let rule = &self.profile.camera;
-        let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width, height });
-        recorded.cropped_and_scaled(crop, rule.width, rule.height)
+    /// Bring the returns of a sensor's message onto the stored picture.
+    fn project<T>(
+        &self,
+        sensor: &Option<Sensor>,
+        message: &[u8],
+        stamp_ns: i64,
+        pixels: impl Fn(&Topic, &[u8], &Pose, &Camera) -> Result<T>,
+    ) -> Result<T, String> {
+        let (Some(sensor), Some(camera)) = (sensor, &self.stored_camera) else {
+            unreachable!("a sensor is placed where there is a calibrated camera")
+        };
+        let recording = &self.recording;
+        let topic = &recording.topics[&sensor.topic];
+        let camera_frame = &self.camera_topic().frame_id;
+        let pose = recording.transforms.lookup(camera_frame, &topic.frame_id, stamp_ns)?;
+        let pose = sensor.optical_from_camera.then(&pose);
+        pixels(topic, message, &pose, camera).map_err(|error| error.to_string())
+    }
+
+    fn camera_topic(&self) -> &Topic {
+        let name = self.mapping.camera.as_deref().unwrap_or_default();
+        &self.recording.topics[name]
     }
 
     fn route(&self, tick: &Tick) -> Route {
@@ -343,6 +371,42 @@ impl Drive {
             .and_then(|path| path.value.ahead_on_route(&tick.ego))
             .unwrap_or_else(|| self.driven.ahead_of_driver(tick.stamp_ns, &tick.ego))
     }
+}
+
+/// The picture of a message as it was recorded, or what is wrong with it.
+fn recorded_picture(topic: &Topic, message: &[u8]) -> Result<Rgb, String> {
+    let message = topic.decode(message).map_err(|error| error.to_string())?;
+    let picture = signals::picture(topic.kind, &message).map_err(|error| error.to_string())?;
+    picture::decode(&picture)
+}
+
+/// Width and height of the first picture that can be decoded: those of all pictures of a drive,
+/// so that one calibration holds for all its frames.
+fn picture_size(recording: &Recording, camera: &Topic) -> Result<(usize, usize)> {
+    let Series::Located(samples) = &camera.series else { return Ok((0, 0)) };
+    let mut reader = SegmentReader::new(&recording.log);
+    let mut why = String::new();
+    for sample in samples {
+        match recorded_picture(camera, reader.message(&sample.value)?) {
+            Ok(rgb) => return Ok((rgb.width, rgb.height)),
+            Err(error) => why = error,
+        }
+    }
+    let what = format!("none of the {} pictures of {} can be decoded", samples.len(), camera.name);
+    Err(mapping_error(&recording.log, what, &format!("the last one: {why}")))
+}
+
+/// The camera of the stored picture, when the recorded one has this width and height.
+fn stored_camera(
+    camera: &Camera,
+    (width, height): (usize, usize),
+    rule: &CameraRule,
+) -> Result<Camera> {
+    // Calibrated at another resolution than the pictures have: binning, or scaling on the way.
+    let all = Crop { x: 0, y: 0, width: camera.width, height: camera.height };
+    let recorded = camera.cropped_and_scaled(all, width, height)?;
+    let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width, height });
+    recorded.cropped_and_scaled(crop, rule.width, rule.height)
 }
 
 impl Sensor {

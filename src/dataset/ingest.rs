@@ -209,7 +209,7 @@ impl Job {
             messages: recording.log.message_count(),
             conditions: drive.conditions.clone(),
             mapping: drive.mapping.clone(),
-            calibration: drive.calibration()?,
+            calibration: drive.calibration(),
             frames: made.frames,
             frames_with_full_future: made.frames_with_full_future,
             start_ns: drive.grid.start_ns,

@@ -17,6 +17,8 @@ pub const CONDITIONS_RECORD: &str = "pmp.conditions";
 /// always those that the driver wanted because steering was disturbed on purpose.
 pub const APPLIED_CONTROL: &str = "applied_control";
 
+pub mod chunk;
+pub mod hashed;
 pub mod reader;
 pub mod value;
 pub mod schema;

@@ -16,7 +16,13 @@ use std::{
 
 use mcap::records::{ChunkHeader, Record, op};
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    log::{
+        chunk::{Decompressor, RECORD_HEADER_BYTES, Records, chunk_header, le_u64},
+        hashed::HashedFile,
+    },
+};
 
 /// Longest record that is read, compressed or not. A chunk of 512 MiB is a hundred times what
 /// recorders write; a length beyond it is damage or an attack.
@@ -25,7 +31,6 @@ pub const MAX_RECORD_BYTES: u64 = 512 << 20;
 /// Messages outside chunks are fetched in pieces of this size.
 const PLAIN_SEGMENT_BYTES: u64 = 4 << 20;
 
-const RECORD_HEADER_BYTES: u64 = 9;
 const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The definition of a message type, as the log carries it.
@@ -49,8 +54,8 @@ pub struct Channel {
     pub schema: Option<Arc<SchemaRecord>>,
 }
 
-/// Where a message lies in the file: fetch it again with [`Log::segment`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Where a message lies in the file: fetch it again with a [`SegmentReader`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Place {
     pub segment: u32,
     /// Byte range of the message's data within the segment.
@@ -88,6 +93,8 @@ enum Segment {
 pub struct Log {
     pub path: PathBuf,
     pub size_bytes: u64,
+    /// SHA-256 of the file, lower-case hexadecimal.
+    pub sha256: String,
     pub channels: BTreeMap<u16, Arc<Channel>>,
     /// Messages a channel, by channel id.
     pub counts: BTreeMap<u16, u64>,
@@ -113,6 +120,7 @@ impl Log {
         let mut log = Log {
             path: path.to_path_buf(),
             size_bytes,
+            sha256: String::new(),
             channels: BTreeMap::new(),
             counts: BTreeMap::new(),
             metadata: BTreeMap::new(),
@@ -128,21 +136,6 @@ impl Log {
     /// Messages that could be read.
     pub fn message_count(&self) -> u64 {
         self.counts.values().sum()
-    }
-
-    /// The bytes of a segment, decompressed; [`Place`]s point into them.
-    ///
-    /// # Errors
-    ///
-    /// If the file has changed or become unreadable since the scan.
-    pub fn segment(&self, index: u32) -> Result<Vec<u8>> {
-        match &self.segments[index as usize] {
-            Segment::Plain { offset, len } => self.read_at(*offset, *len),
-            Segment::Chunk { data_offset, stored_bytes, header } => {
-                let stored = self.read_at(*data_offset, *stored_bytes)?;
-                Ok(decompress(header, stored).0)
-            }
-        }
     }
 
     fn read_at(&self, offset: u64, len: u64) -> Result<Vec<u8>> {
@@ -208,13 +201,22 @@ struct Walk<'f> {
 }
 
 impl Walk<'_> {
-    fn run(&mut self, log: &mut Log) -> Result<()> {
+    fn run(mut self, log: &mut Log) -> Result<()> {
         let path = log.path.clone();
         let file = log.file.try_clone().map_err(Error::io("open", &path))?;
-        let mut reader = BufReader::with_capacity(1 << 20, file);
+        // Small, so that chunks are read past it, straight to where they are wanted.
+        let mut reader = BufReader::with_capacity(1 << 14, HashedFile::new(file));
+        self.records(log, &mut reader)?;
+        log.sha256 = reader.into_inner().finish().map_err(Error::io("read", &path))?;
+        Ok(())
+    }
+
+    fn records(&mut self, log: &mut Log, reader: &mut BufReader<HashedFile>) -> Result<()> {
+        let path = log.path.clone();
         let mut offset = mcap::MAGIC.len() as u64;
         reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
         let mut body = Vec::new();
+        let mut decompressor = Decompressor::default();
 
         loop {
             let left = log.size_bytes - offset;
@@ -259,7 +261,7 @@ impl Walk<'_> {
             match opcode {
                 op::CHUNK => {
                     self.chunks.insert(offset);
-                    self.chunk(log, offset, &body)?;
+                    self.chunk(log, offset, &body, &mut decompressor)?;
                 }
                 op::MESSAGE => {
                     let place = log.place_plain(offset, RECORD_HEADER_BYTES + len);
@@ -296,7 +298,13 @@ impl Walk<'_> {
         offsets.into_iter().find(|at| *at > end && *at < log.size_bytes)
     }
 
-    fn chunk(&mut self, log: &mut Log, offset: u64, body: &[u8]) -> Result<()> {
+    fn chunk(
+        &mut self,
+        log: &mut Log,
+        offset: u64,
+        body: &[u8],
+        decompressor: &mut Decompressor,
+    ) -> Result<()> {
         let Some((header, header_bytes)) = chunk_header(body) else {
             log.damaged(offset, "chunk with an unreadable header");
             return Ok(());
@@ -306,25 +314,19 @@ impl Walk<'_> {
             log.damaged(offset, &what);
             return Ok(());
         }
-        if !["", "zstd", "lz4"].contains(&header.compression.as_str()) {
-            let what = format!("chunk with unknown compression `{}`", header.compression);
-            log.damaged(offset, &what);
+        let stored_bytes = header.compressed_size;
+        let Some(stored) = body[header_bytes..].get(..stored_bytes as usize) else {
+            log.damaged(offset, "chunk that claims more bytes than it has");
             return Ok(());
-        }
-        let stored = match body[header_bytes..].get(..header.compressed_size as usize) {
-            Some(stored) => stored.to_vec(),
-            None => {
-                log.damaged(offset, "chunk that claims more bytes than it has");
+        };
+        let data = match decompressor.decompress(&header, stored) {
+            Ok(data) => data,
+            Err(why) => {
+                log.damaged(offset, &format!("chunk that does not decompress ({why}), left out"));
                 return Ok(());
             }
         };
-        let stored_bytes = header.compressed_size;
-        let (data, failure) = decompress(&header, stored);
-        if let Some(failure) = failure {
-            log.damaged(offset, &format!("chunk that does not decompress ({failure}), left out"));
-            return Ok(());
-        }
-        if header.uncompressed_crc != 0 && crc32fast::hash(&data) != header.uncompressed_crc {
+        if header.uncompressed_crc != 0 && crc32fast::hash(data) != header.uncompressed_crc {
             log.damaged(offset, "chunk whose checksum does not match, left out");
             return Ok(());
         }
@@ -332,7 +334,7 @@ impl Walk<'_> {
         let data_offset = offset + RECORD_HEADER_BYTES + header_bytes as u64;
         log.segments.push(Segment::Chunk { data_offset, stored_bytes, header });
         let mut read = 0;
-        for record in Records::new(&data) {
+        for record in Records::new(data) {
             read = record.start + record.body.len();
             self.record(log, record.opcode, record.body, (segment, record.start as u32))?;
         }
@@ -418,74 +420,52 @@ impl Log {
     }
 }
 
-/// Records of a decompressed chunk or of the summary, as far as they are whole.
-struct Records<'a> {
-    data: &'a [u8],
-    at: usize,
+/// Fetches messages of a scanned log again; a segment is read and decompressed once for all the
+/// messages of it that are asked for in a row.
+pub struct SegmentReader<'l> {
+    log: &'l Log,
+    current: Option<u32>,
+    stored: Vec<u8>,
+    decompressor: Decompressor,
 }
 
-struct RawRecord<'a> {
-    opcode: u8,
-    body: &'a [u8],
-    /// Where the body starts.
-    start: usize,
-}
-
-impl<'a> Records<'a> {
-    fn new(data: &'a [u8]) -> Self {
-        Records { data, at: 0 }
+impl<'l> SegmentReader<'l> {
+    pub fn new(log: &'l Log) -> Self {
+        let (stored, decompressor) = (Vec::new(), Decompressor::default());
+        SegmentReader { log, current: None, stored, decompressor }
     }
-}
 
-impl<'a> Iterator for Records<'a> {
-    type Item = RawRecord<'a>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let start = self.at + RECORD_HEADER_BYTES as usize;
-        let header = self.data.get(self.at..start)?;
-        let len = usize::try_from(le_u64(&header[1..])).ok()?;
-        let body = self.data.get(start..start.checked_add(len)?)?;
-        self.at = start + len;
-        Some(RawRecord { opcode: header[0], body, start })
+    /// The data of a message.
+    ///
+    /// # Errors
+    ///
+    /// If the file has changed or become unreadable since the scan.
+    pub fn message(&mut self, place: &Place) -> Result<&[u8]> {
+        let log = self.log;
+        let (offset, stored_bytes, header) = match &log.segments[place.segment as usize] {
+            Segment::Plain { offset, len } => (*offset, *len, None),
+            Segment::Chunk { data_offset, stored_bytes, header } => {
+                (*data_offset, *stored_bytes, Some(header))
+            }
+        };
+        let changed = |what: String| {
+            let hint = Some("was it changed while it was read? ingest it again".to_string());
+            Error::Log { path: log.path.clone(), offset, what, hint }
+        };
+        let is_new = self.current.replace(place.segment) != Some(place.segment);
+        if is_new {
+            self.stored.resize(stored_bytes as usize, 0);
+            let read = log.file.read_exact_at(&mut self.stored, offset);
+            read.map_err(Error::io("read", &log.path))?;
+        }
+        let segment = match header {
+            Some(header) if is_new => {
+                self.decompressor.decompress(header, &self.stored).map_err(changed)?
+            }
+            Some(header) => self.decompressor.last(header, &self.stored),
+            None => &self.stored,
+        };
+        let range = place.start as usize..(place.start + place.len) as usize;
+        segment.get(range).ok_or_else(|| changed("a message that is not there any more".into()))
     }
-}
-
-/// Header of a chunk and its length.
-fn chunk_header(body: &[u8]) -> Option<(ChunkHeader, usize)> {
-    // start, end and size (8 each), checksum (4), then the compression's name with its length.
-    let name_len = u32::from_le_bytes(body.get(28..32)?.try_into().ok()?) as usize;
-    let name = body.get(32..32usize.checked_add(name_len)?)?;
-    let header_bytes = 32 + name_len + 8;
-    let header = ChunkHeader {
-        message_start_time: le_u64(body.get(0..8)?),
-        message_end_time: le_u64(body.get(8..16)?),
-        uncompressed_size: le_u64(body.get(16..24)?),
-        uncompressed_crc: u32::from_le_bytes(body.get(24..28)?.try_into().ok()?),
-        compression: String::from_utf8(name.to_vec()).ok()?,
-        compressed_size: le_u64(body.get(header_bytes - 8..header_bytes)?),
-    };
-    Some((header, header_bytes))
-}
-
-/// As much of a chunk as can be decompressed, and why it is not all.
-fn decompress(header: &ChunkHeader, stored: Vec<u8>) -> (Vec<u8>, Option<String>) {
-    let expected = header.uncompressed_size;
-    let mut data = Vec::with_capacity(expected.min(16 << 20) as usize);
-    let read = match header.compression.as_str() {
-        "" => return (stored, None),
-        "zstd" => zstd::Decoder::with_buffer(stored.as_slice())
-            .and_then(|decoder| decoder.take(expected).read_to_end(&mut data)),
-        _ => lz4::Decoder::new(stored.as_slice())
-            .and_then(|decoder| decoder.take(expected).read_to_end(&mut data)),
-    };
-    let failure = match read {
-        Err(error) => Some(error.to_string()),
-        Ok(_) if (data.len() as u64) < expected => Some("it is shorter than it claims".to_string()),
-        Ok(_) => None,
-    };
-    (data, failure)
-}
-
-fn le_u64(bytes: &[u8]) -> u64 {
-    bytes.iter().take(8).rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
 }
