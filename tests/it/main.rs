@@ -14,6 +14,7 @@ mod idl;
 mod foxglove;
 mod protobuf;
 mod logs;
+mod fuzz_corpus;
 mod alignment;
 mod ingest;
 mod real_drive;
