@@ -22,7 +22,7 @@ use pmp::{
 };
 
 /// A whole file: scanned, mapped, aligned, and its first frames made.
-pub fn mcap(input: &[u8]) -> bool {
+pub(crate) fn mcap(input: &[u8]) -> bool {
     let path = scratch();
     fs::write(&path, input).expect("the scratch file can be written");
     let Ok(drive) = Drive::open(&path, &Profile::default(), 10.0) else { return false };
@@ -31,32 +31,32 @@ pub fn mcap(input: &[u8]) -> bool {
 }
 
 /// A ROS 2 definition (`ros2msg`, or `ros2idl` where the text has a `module`) and a CDR message.
-pub fn cdr(input: &[u8]) -> bool {
+pub(crate) fn cdr(input: &[u8]) -> bool {
     let Some(parts) = Parts::of(input) else { return false };
     let is_idl = parts.definition.windows(7).any(|word| word == b"module ");
     parts.decode(if is_idl { "ros2idl" } else { "ros2msg" }, "cdr")
 }
 
 /// A ROS 1 definition and a message.
-pub fn ros1(input: &[u8]) -> bool {
+pub(crate) fn ros1(input: &[u8]) -> bool {
     let Some(parts) = Parts::of(input) else { return false };
     parts.decode("ros1msg", "ros1")
 }
 
 /// A descriptor set and a message.
-pub fn protobuf(input: &[u8]) -> bool {
+pub(crate) fn protobuf(input: &[u8]) -> bool {
     let Some(parts) = Parts::of(input) else { return false };
     parts.decode("protobuf", "protobuf")
 }
 
 /// A JSON Schema and a message.
-pub fn json(input: &[u8]) -> bool {
+pub(crate) fn json(input: &[u8]) -> bool {
     let Some(parts) = Parts::of(input) else { return false };
     parts.decode("jsonschema", "json")
 }
 
 /// A `sensor_msgs/PointCloud2` in CDR, projected as a lidar's and as a radar's.
-pub fn cloud(input: &[u8]) -> bool {
+pub(crate) fn cloud(input: &[u8]) -> bool {
     let name = "sensor_msgs/msg/PointCloud2";
     let text = definitions::definition(name).expect("a type that pmp writes");
     let channel = channel(name, "ros2msg", "cdr", text.into_bytes());

@@ -22,9 +22,10 @@ use crate::{
     atomic::{self, UNFINISHED, sha256_of_file},
     dataset::{
         align::Tick,
+        compaction::{compact, remove_leftovers},
         drive::Drive,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, ShardRecord, write_episodes},
-        shard::{ROWS_PER_GROUP, ROWS_PER_SHARD, ShardWriter},
+        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
+        shard::{ROWS_PER_GROUP, ROWS_PER_SHARD, ShardRecord, ShardWriter},
         split::Split,
     },
     drops::Drops,
@@ -153,9 +154,11 @@ pub fn ingest(
         let nothing = || Error::Config { key: "LOG".into(), what: "no log".into(), hint: None };
         return Err(first_error.unwrap_or_else(nothing));
     }
+    compact(out, &mut committed)?;
     let manifest = Manifest::new(config.clone(), committed, failed);
     write_episodes(&out.join("episodes.parquet"), &manifest.logs)?;
     atomic::write_json(&Manifest::path(out), &manifest)?;
+    remove_leftovers(out, &manifest.logs)?;
     Ok(manifest)
 }
 
@@ -280,7 +283,7 @@ impl Job {
             let rows = writer.rows() as u64;
             let committed = writer.finish()?;
             let (bytes, sha256) = (committed.bytes, committed.sha256);
-            made.shards.push(ShardRecord { path, rows, bytes, sha256 });
+            made.shards.push(ShardRecord { path, rows, bytes, sha256, groups: None });
         }
         Ok(made)
     }
@@ -367,6 +370,8 @@ fn same_logs(finished: Manifest, jobs: &[Job], out: &Path) -> Result<Manifest> {
         let hint = Some("remove the dataset and ingest the logs again".to_string());
         return Err(Error::Dataset { path: out.to_path_buf(), what, hint });
     }
+    // A process that was killed after it had written the manifest may have left some.
+    remove_leftovers(out, &finished.logs)?;
     Ok(finished)
 }
 

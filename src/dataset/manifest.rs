@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     atomic::{self, AtomicFile},
-    dataset::{drive::Calibration, split::Split},
+    dataset::{drive::Calibration, shard::ShardRecord, split::Split},
     drops::{Drops, Reason},
     error::{Error, Result},
     frame::Conditions,
@@ -57,17 +57,6 @@ impl IngestConfig {
         }
         Ok(IngestConfig { dataset_version: DATASET_VERSION, rate_hz, profile })
     }
-}
-
-/// A shard, as committed.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ShardRecord {
-    /// Relative to the dataset.
-    pub path: String,
-    pub rows: u64,
-    pub bytes: u64,
-    /// SHA-256, lower-case hexadecimal.
-    pub sha256: String,
 }
 
 /// A log, as committed.

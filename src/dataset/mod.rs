@@ -21,6 +21,7 @@ pub mod shard;
 pub mod split;
 pub mod manifest;
 pub mod summary;
+pub mod compaction;
 pub mod ingest;
 pub mod inspect;
 pub mod open;

@@ -8,7 +8,7 @@ use crate::{
         shard::{RowTick, ShardReader},
         split::Split,
     },
-    error::{Error, Result},
+    error::Result,
     frame::{FUTURE_STEPS, Frame},
 };
 
@@ -174,7 +174,7 @@ impl Dataset {
         };
         let mut last_tick = 0;
         for record in &log.shards {
-            let reader = ShardReader::open(&self.path.join(&record.path))?;
+            let reader = ShardReader::open(&self.path, record)?;
             let last = reader.ticks()?.into_iter().flatten().map(|tick| tick.index).max();
             last_tick = last_tick.max(last.unwrap_or(0));
         }
@@ -194,13 +194,7 @@ impl Dataset {
         let mut ticks: Vec<Vec<Vec<RowTick>>> = Vec::new();
         let first_shard = self.shards.len();
         for record in &log.shards {
-            let path = self.path.join(&record.path);
-            if !path.exists() {
-                let what = "a shard that the manifest names is missing".to_string();
-                let hint = Some("copy the dataset again, or ingest the logs again".to_string());
-                return Err(Error::Dataset { path, what, hint });
-            }
-            let reader = ShardReader::open(&path)?;
+            let reader = ShardReader::open(&self.path, record)?;
             ticks.push(reader.ticks()?);
             self.shards.push(reader);
         }

@@ -4,7 +4,7 @@
 //! little; pictures stored as they are, since JPEG does not compress again; lidar and radar as
 //! delta-coded pixels and byte-split half floats under zstd, a fifth of their plain size.
 
-use std::{fs::File, path::Path};
+use std::{fs::File, ops::Range, path::Path};
 
 use arrow::{
     array::{AsArray, RecordBatch},
@@ -20,6 +20,8 @@ use parquet::{
     schema::types::ColumnPath,
 };
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     atomic::{AtomicFile, Committed},
     dataset::columns::{self, SCHEMA_VERSION, VERSION_KEY},
@@ -32,6 +34,22 @@ pub const ROWS_PER_GROUP: usize = 64;
 
 /// Frames in a shard: about 150 MB with lidar.
 pub const ROWS_PER_SHARD: usize = 2048;
+
+/// A shard, as committed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ShardRecord {
+    /// Relative to the dataset.
+    pub path: String,
+    /// Frames of this log in the file.
+    pub rows: u64,
+    /// Of the file.
+    pub bytes: u64,
+    /// SHA-256 of the file, lower-case hexadecimal.
+    pub sha256: String,
+    /// First row group and number of row groups, where the file holds shards of other logs too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub groups: Option<[usize; 2]>,
+}
 
 /// A shard being written.
 pub struct ShardWriter {
@@ -82,7 +100,8 @@ impl ShardWriter {
     }
 }
 
-fn properties() -> WriterProperties {
+/// How frames are encoded in a shard.
+pub fn properties() -> WriterProperties {
     let zstd = Compression::ZSTD(ZstdLevel::try_new(3).unwrap_or_default());
     let item = |column: &str| {
         ColumnPath::new(vec![column.to_string(), "list".to_string(), "element".to_string()])
@@ -133,29 +152,44 @@ fn row_ticks(batch: &RecordBatch) -> Result<Vec<RowTick>, String> {
 pub struct ShardReader {
     path: std::path::PathBuf,
     metadata: ArrowReaderMetadata,
+    /// Row groups of the file that are this shard's.
+    groups: Range<usize>,
 }
 
 impl ShardReader {
-    /// Open a shard and read its footer.
+    /// Open a shard of a dataset and read its footer.
     ///
     /// # Errors
     ///
-    /// [`Error::Dataset`] if it was written under another version of the schema;
+    /// [`Error::Dataset`] if the file is missing, has not the row groups of the record, or was written under another version of the schema;
     /// [`Error::Parquet`] if it is damaged.
-    pub fn open(path: &Path) -> Result<ShardReader> {
+    pub fn open(dataset: &Path, record: &ShardRecord) -> Result<ShardReader> {
+        let path = &dataset.join(&record.path);
+        let fail = |what: &str, hint: &str| {
+            let (path, what, hint) = (path.clone(), what.to_string(), Some(hint.to_string()));
+            Error::Dataset { path, what, hint }
+        };
+        if !path.exists() {
+            let what = "a shard that the manifest names is missing";
+            return Err(fail(what, "copy the dataset again, or ingest the logs again"));
+        }
         let file = File::open(path).map_err(Error::io("open", path))?;
         let metadata =
             ArrowReaderMetadata::load(&file, Default::default()).map_err(Error::parquet(path))?;
         let found = metadata.schema().metadata().get(VERSION_KEY).cloned();
         if found.as_deref() != Some(SCHEMA_VERSION.to_string().as_str()) {
             let found = found.unwrap_or_else(|| "none".to_string());
-            return Err(Error::Dataset {
-                path: path.to_path_buf(),
-                what: format!("frame schema version {found}, this build reads {SCHEMA_VERSION}"),
-                hint: Some("ingest the logs again: the manifest names them".to_string()),
-            });
+            let what = format!("frame schema version {found}, this build reads {SCHEMA_VERSION}");
+            return Err(fail(&what, "ingest the logs again: the manifest names them"));
         }
-        Ok(ShardReader { path: path.to_path_buf(), metadata })
+        let in_file = metadata.metadata().num_row_groups();
+        let [first, count] = record.groups.unwrap_or([0, in_file]);
+        let groups = first..first.saturating_add(count);
+        if groups.end > in_file {
+            let what = format!("{in_file} row groups, where the manifest names {groups:?}");
+            return Err(fail(&what, "copy the dataset again, or ingest the logs again"));
+        }
+        Ok(ShardReader { path: path.clone(), metadata, groups })
     }
 
     /// Where on the grid every row is, by row group.
@@ -164,13 +198,13 @@ impl ShardReader {
     ///
     /// [`Error::Parquet`] if the shard is damaged.
     pub fn ticks(&self) -> Result<Vec<Vec<RowTick>>> {
-        let groups = 0..self.metadata.metadata().num_row_groups();
         let schema = self.metadata.parquet_schema();
         let columns = ProjectionMask::columns(schema, ["frame", "perturbed"]);
+        let groups = 0..self.groups.len();
         groups.map(|group| self.read(group, columns.clone(), &row_ticks)).collect()
     }
 
-    /// The frames of a row group, each with its episode.
+    /// The frames of a row group (0 is the first of this shard), each with its episode.
     ///
     /// # Errors
     ///
@@ -190,7 +224,7 @@ impl ShardReader {
         let reader =
             ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone())
                 .with_projection(columns)
-                .with_row_groups(vec![group])
+                .with_row_groups(vec![self.groups.start + group])
                 .with_batch_size(ROWS_PER_GROUP)
                 .build()
                 .map_err(Error::parquet(&self.path))?;

@@ -7,7 +7,7 @@
 //! to be built with half floats.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs, iter,
     path::{Path, PathBuf},
 };
@@ -125,11 +125,13 @@ fn read_frames(dataset: &Path, manifest: &Manifest) -> Result<LazyFrame> {
         let mut tables = vec![no_frames().lazy()];
         for split in Split::ALL {
             let logs = manifest.logs.iter().filter(|log| log.split == split);
-            let shards: Vec<_> = logs.flat_map(|log| &log.shards).collect();
+            // A file may hold shards of several logs.
+            let shards: BTreeSet<_> =
+                logs.flat_map(|log| &log.shards).map(|shard| &shard.path).collect();
             if !shards.is_empty() {
                 let mut columns = columns.clone();
                 columns.insert(0, lit(split.name()).alias("split"));
-                let paths = shards.iter().map(|shard| dataset.join(&shard.path));
+                let paths = shards.iter().map(|path| dataset.join(path));
                 tables.push(scan(paths)?.select(columns));
             }
         }

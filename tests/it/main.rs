@@ -17,6 +17,7 @@ mod logs;
 mod fuzz_corpus;
 mod alignment;
 mod ingest;
+mod compaction;
 mod real_drive;
 #[cfg(feature = "learning")]
 mod evaluation;

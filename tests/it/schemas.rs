@@ -13,7 +13,8 @@ use pmp::{
     dataset::{
         columns::{self, SCHEMA_VERSION, VERSION_KEY},
         drive::Calibration,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, ShardRecord, write_episodes},
+        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
+        shard::ShardRecord,
         split::Split,
     },
     drops::{Drops, Reason},
@@ -139,7 +140,13 @@ fn manifest() -> Manifest {
         out_of_order: BTreeMap::from([("/odom".into(), 10)]),
         left_out: vec!["left out".into()],
         notes: vec!["a note".into()],
-        shards: vec![ShardRecord { path: "a".into(), rows: 3, bytes: 11, sha256: "00".into() }],
+        shards: vec![ShardRecord {
+            path: "a".into(),
+            rows: 3,
+            bytes: 11,
+            sha256: "00".into(),
+            groups: Some([0, 1]),
+        }],
     };
     let transform = PoseSource::Transform("base_link".into());
     let transform = Mapping { pose: Some(transform), ..mapping.clone() };

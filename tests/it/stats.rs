@@ -11,7 +11,8 @@ use std::{
 use pmp::{
     dataset::{
         drive::Calibration,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, ShardRecord, write_episodes},
+        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
+        shard::ShardRecord,
         shard::ShardWriter,
         split::Split,
     },
@@ -87,7 +88,13 @@ fn write(root: &Path, drives: &[Drive], change: impl Fn(&mut Vec<LogRecord>)) ->
             out_of_order: BTreeMap::new(),
             left_out: Vec::new(),
             notes: Vec::new(),
-            shards: vec![ShardRecord { path, rows, bytes, sha256: format!("{number}") }],
+            shards: vec![ShardRecord {
+                path,
+                rows,
+                bytes,
+                sha256: format!("{number}"),
+                groups: None,
+            }],
         }
     };
     let mut logs: Vec<LogRecord> = drives.iter().enumerate().map(record).collect();
