@@ -21,6 +21,7 @@ use crate::{
     definitions::{TOPIC_TYPES, ros1_definition},
     fixtures::{Cdr, DriveLog, Format, Layout},
     ingest::{frames, into},
+    writers::python,
 };
 
 /// What a field must decode to; arrays of numbers as numbers.
@@ -346,13 +347,13 @@ fn is_json(value: &Value, json: &Json) -> bool {
 
 #[test]
 fn ros1_messages_of_the_python_package_rosbags_decode_to_its_values() {
-    let has_peer = Command::new("python3").args(["-c", "import rosbags"]).output();
+    let has_peer = Command::new(python()).args(["-c", "import rosbags"]).output();
     if !has_peer.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: python3 has no package rosbags");
+        eprintln!("skipped: {} has no package rosbags", python());
         return;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/rosbags_ros1.py");
-    let output = Command::new("python3").arg(script).output().unwrap();
+    let output = Command::new(python()).arg(script).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let lines = String::from_utf8(output.stdout).unwrap();
     let mut types = 0;
