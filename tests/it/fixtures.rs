@@ -224,6 +224,8 @@ pub(crate) struct DriveLog {
     pub(crate) ego_gap_s: Option<(f64, f64)>,
     /// Pictures that are no JPEG, by index.
     pub(crate) bad_pictures: Vec<usize>,
+    /// Zeros behind every picture's end: bytes to carry that cost no decoding.
+    pub(crate) picture_padding: usize,
     /// Swap neighbours of each topic, so that every second message comes late.
     pub(crate) is_out_of_order: bool,
     pub(crate) layout: Layout,
@@ -245,6 +247,7 @@ impl Default for DriveLog {
             camera_gap_s: None,
             ego_gap_s: None,
             bad_pictures: Vec::new(),
+            picture_padding: 0,
             is_out_of_order: false,
             layout: Layout::default(),
         }
@@ -369,11 +372,12 @@ impl DriveLog {
 
     fn picture(&self, index: usize, t: f64) -> Recorded {
         let mut cdr = self.cdr(t, "camera");
-        let data = if self.bad_pictures.contains(&index) {
+        let mut data = if self.bad_pictures.contains(&index) {
             b"no picture".to_vec()
         } else {
             jpeg(CAMERA_WIDTH, CAMERA_HEIGHT, (index * 3 % 256) as u8)
         };
+        data.resize(data.len() + self.picture_padding, 0);
         cdr.text("jpeg").bytes(&data);
         self.message("/camera/front/image/compressed", "sensor_msgs/CompressedImage", t, &mut cdr)
     }

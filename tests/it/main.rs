@@ -18,6 +18,7 @@ mod fuzz_corpus;
 mod alignment;
 mod ingest;
 mod compaction;
+mod memory;
 mod writers;
 mod real_drive;
 #[cfg(feature = "learning")]
