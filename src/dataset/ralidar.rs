@@ -100,28 +100,37 @@ fn radar_cloud(message: &Struct) -> Result<Vec<RadarReturn>> {
 /// The nearest return of each pixel.
 struct Nearest<'c, T> {
     camera: &'c Camera,
-    /// Pixel, squared distance, order of arrival, what the return says.
-    returns: Vec<(u32, f64, u32, T)>,
+    /// For each pixel one more than the index of its return; 0 where there is none.
+    by_pixel: Vec<u32>,
+    /// Squared distance, and what the return says.
+    returns: Vec<(f64, T)>,
 }
 
 impl<'c, T: Copy> Nearest<'c, T> {
     fn new(camera: &'c Camera) -> Self {
-        Nearest { camera, returns: Vec::new() }
+        let by_pixel = vec![0; camera.width * camera.height];
+        Nearest { camera, by_pixel, returns: Vec::new() }
     }
 
-    /// A return at a point of the optical frame; NaNs fall off the picture.
+    /// A return at a point of the optical frame; NaNs fall off the picture. Of two equally near
+    /// returns the first stays.
     fn add(&mut self, point_m: DVec3, says: T) {
-        if let Some(pixel) = self.camera.pixel(point_m.to_array()) {
-            let order = self.returns.len() as u32;
-            self.returns.push((pixel, point_m.length_squared(), order, says));
+        let Some(pixel) = self.camera.pixel(point_m.to_array()) else { return };
+        let here = (point_m.length_squared(), says);
+        let slot = &mut self.by_pixel[pixel as usize];
+        match slot.checked_sub(1) {
+            None => {
+                self.returns.push(here);
+                *slot = self.returns.len() as u32;
+            }
+            Some(at) if here.0 < self.returns[at as usize].0 => self.returns[at as usize] = here,
+            Some(_) => {}
         }
     }
 
-    /// Ascending by pixel; of two equally near returns the first of the message.
-    fn finish(mut self) -> impl Iterator<Item = (u32, T)> {
-        self.returns
-            .sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-        self.returns.dedup_by_key(|r| r.0);
-        self.returns.into_iter().map(|(pixel, _, _, says)| (pixel, says))
+    /// Ascending by pixel.
+    fn finish(self) -> impl Iterator<Item = (u32, T)> {
+        let occupied = (0..).zip(self.by_pixel).filter(|(_, slot)| *slot > 0);
+        occupied.map(move |(pixel, slot)| (pixel, self.returns[slot as usize - 1].1))
     }
 }
