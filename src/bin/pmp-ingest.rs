@@ -11,13 +11,16 @@ use pmp::{
     },
     error::Result,
     frame::GRID_HZ,
-    log::profile::Profile,
+    log::{
+        clock::{self, Clock},
+        profile::Profile,
+    },
 };
 
 /// Turn MCAP driving logs into a sharded Parquet dataset
 ///
 /// Topics are found by their type (`pmp-ingest inspect LOG` shows which), aligned by header stamp
-/// to a 10 Hz grid, and written as frames: camera, lidar and radar on the picture, ego motion,
+/// (or as `--clock` and `--offset` say) to a 10 Hz grid, and written as frames: camera, lidar and radar on the picture, ego motion,
 /// route, what the driver did, and 3 s of what the car did next. Ticks where a needed signal has a
 /// gap are left out and counted, never filled.
 ///
@@ -42,6 +45,12 @@ enum Inspect {
         /// `auto`, `carla-ros-bridge`, or a FILE.toml
         #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
         profile: String,
+        /// Stamp a topic's messages by another instant than their header's
+        #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
+        clock: Vec<(String, Clock)>,
+        /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
+        #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
+        offset: Vec<(String, f64)>,
         /// Print JSON
         #[arg(long)]
         json: bool,
@@ -62,6 +71,14 @@ struct Ingest {
     #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
     profile: String,
 
+    /// Stamp a topic's messages by another instant than their header's
+    #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
+    clock: Vec<(String, Clock)>,
+
+    /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
+    #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
+    offset: Vec<(String, f64)>,
+
     /// Ticks a second
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
     rate: f64,
@@ -70,6 +87,17 @@ struct Ingest {
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
 }
+
+/// A profile, with what flags say of clocks in place of what it says.
+fn profile(name: &str, clocks: &[(String, Clock)], offsets: &[(String, f64)]) -> Result<Profile> {
+    let mut profile = Profile::load(name)?;
+    profile.clock.topics.extend(clocks.iter().cloned());
+    profile.clock.offset_s.extend(offsets.iter().cloned());
+    profile.check()?;
+    Ok(profile)
+}
+
+const CLOCK: &str = "TOPIC=header|log|publish";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -82,8 +110,8 @@ Exit codes: 0 everything was used; 3 something was left out, the report says wha
 fn main() -> ExitCode {
     let cli = Cli::parse();
     cli::main(|| match (cli.command, cli.ingest) {
-        (Some(Inspect::Inspect { log, profile, json }), _) => {
-            let report = inspect::inspect(&log, &Profile::load(&profile)?)?;
+        (Some(Inspect::Inspect { log, profile: name, clock, offset, json }), _) => {
+            let report = inspect::inspect(&log, &profile(&name, &clock, &offset)?)?;
             cli::print(&if json { report.json() } else { report.to_string() })?;
             Ok(Outcome::Done)
         }
@@ -94,7 +122,8 @@ fn main() -> ExitCode {
 
 fn run(args: &Ingest) -> Result<Outcome> {
     let logs = ingest::find_logs(&args.logs)?;
-    let config = manifest::IngestConfig::new(Profile::load(&args.profile)?, args.rate)?;
+    let profile = profile(&args.profile, &args.clock, &args.offset)?;
+    let config = manifest::IngestConfig::new(profile, args.rate)?;
     let bar = cli::progress(0, "frames", "ingest");
     let on = |event| match event {
         Event::Opened { ticks } => bar.inc_length(ticks),

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     dataset::{
         align::{self, Grid, Signals, Tick},
+        clocks,
         control::Controls,
         ego::EgoTrack,
         future::future,
@@ -43,6 +44,8 @@ pub struct Drive {
     pub notes: Vec<String>,
     /// Sensors that the log has and frames will not: each says why.
     pub left_out: Vec<String>,
+    /// The topic of what moved the car, where that is not always what the driver wanted.
+    pub applied_control: Option<String>,
     controls: Controls,
     track: EgoTrack,
     driven: Path,
@@ -79,15 +82,23 @@ pub struct Calibration {
 }
 
 impl Drive {
-    /// Scan a log, choose its topics and lay the grid.
+    /// Scan a log and open its first drive; [`Recording::scan`] gives all of them.
     ///
     /// # Errors
     ///
-    /// If the file is no readable log, has no messages, lacks a camera or an ego pose, has a
-    /// lidar or radar that cannot be placed relative to the camera, or if the profile names a
-    /// topic that is not there.
+    /// If the file is no readable log, and as [`Drive::new`].
     pub fn open(path: &FilePath, profile: &Profile, rate_hz: f64) -> Result<Drive> {
-        let recording = Recording::scan(path)?;
+        Drive::new(Recording::scan(path, &profile.clock)?.swap_remove(0), profile, rate_hz)
+    }
+
+    /// Choose the topics of a recording and lay the grid.
+    ///
+    /// # Errors
+    ///
+    /// If the log has no messages, lacks a camera or an ego pose, has a lidar or radar that cannot
+    /// be placed relative to the camera, has streams whose stamps do not overlap, or if the profile
+    /// names a topic that is not there.
+    pub fn new(recording: Recording, profile: &Profile, rate_hz: f64) -> Result<Drive> {
         if recording.log.message_count() == 0 {
             let what = "the log has no messages";
             let hint = "was anything published while it was recorded? \
@@ -105,7 +116,8 @@ impl Drive {
         };
 
         let mut notes = mapping.notes.clone();
-        let mut left_out = Vec::new();
+        notes.extend(clocks::notes(&recording, &mapping, profile));
+        let mut left_out = clocks::check_overlap(&recording, &mapping, &profile.required, &track)?;
         notes.extend(track.notes.iter().cloned());
         let applied = recording.log.metadata.get(CONDITIONS_RECORD);
         let applied = applied.and_then(|record| record.get(APPLIED_CONTROL)).cloned();
@@ -176,6 +188,7 @@ impl Drive {
             camera,
             notes,
             left_out,
+            applied_control: applied,
             controls,
             track,
             driven,
@@ -184,6 +197,16 @@ impl Drive {
             radar,
             recording,
         })
+    }
+
+    /// Whether frames can have lidar returns.
+    pub fn has_lidar(&self) -> bool {
+        self.lidar.is_some()
+    }
+
+    /// Whether frames can have radar returns.
+    pub fn has_radar(&self) -> bool {
+        self.radar.is_some()
     }
 
     /// What is worth keeping beside the frames.

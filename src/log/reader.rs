@@ -16,7 +16,10 @@ use std::{
 
 use mcap::records::{ChunkHeader, Record, op};
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    log::clock::instant_ns,
+};
 
 /// Longest record that is read, compressed or not. A chunk of 512 MiB is a hundred times what
 /// recorders write; a length beyond it is damage or an attack.
@@ -64,6 +67,8 @@ pub struct Message<'a> {
     pub channel: &'a Arc<Channel>,
     /// When it was recorded, ns since the Unix epoch.
     pub log_time_ns: i64,
+    /// When it was sent, ns since the Unix epoch.
+    pub publish_time_ns: i64,
     pub data: &'a [u8],
     pub place: Place,
 }
@@ -128,6 +133,11 @@ impl Log {
     /// Messages that could be read.
     pub fn message_count(&self) -> u64 {
         self.counts.values().sum()
+    }
+
+    /// Whether there is a channel of this topic, with or without messages.
+    pub fn has_topic(&self, topic: &str) -> bool {
+        self.channels.values().any(|channel| channel.topic == topic)
     }
 
     /// The bytes of a segment, decompressed; [`Place`]s point into them.
@@ -375,8 +385,13 @@ impl Walk<'_> {
                     start: place.1 + MESSAGE_HEADER_BYTES as u32,
                     len: data.len() as u32,
                 };
-                let log_time_ns = header.log_time as i64;
-                (self.on_message)(&Message { channel, log_time_ns, data: &data, place })?;
+                (self.on_message)(&Message {
+                    channel,
+                    log_time_ns: instant_ns(header.log_time),
+                    publish_time_ns: instant_ns(header.publish_time),
+                    data: &data,
+                    place,
+                })?;
             }
             Ok(Record::Metadata(metadata)) => {
                 log.metadata.entry(metadata.name).or_insert(metadata.metadata);
