@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use pmp::{
     cli::{self, Outcome},
     dataset::{
-        ingest::{self, Event},
+        ingest::{self, Event, Share},
         inspect, manifest,
     },
     error::Result,
@@ -83,6 +83,11 @@ struct Ingest {
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
     rate: f64,
 
+    /// Commit only the i-th of n parts of the logs; when all parts are done, the same command
+    /// without --shard finishes the dataset
+    #[arg(long, value_name = "i/n", value_parser = Share::parse)]
+    shard: Option<Share>,
+
     /// Threads [default: all cores]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
@@ -103,6 +108,7 @@ const EXAMPLES: &str = "\
 Examples:
   pmp-ingest --out data drives/              all logs below a folder
   pmp-ingest --out data a.mcap b.mcap --profile my-car.toml
+  pmp-ingest --out data drives/ --shard 2/8  the second of eight processes that share the work
   pmp-ingest inspect a.mcap                  what is in a log, and what would be used
 
 Exit codes: 0 everything was used; 3 something was left out, the report says what; 1 failed; 2 misused";
@@ -129,8 +135,8 @@ fn run(args: &Ingest) -> Result<Outcome> {
         Event::Opened { ticks } => bar.inc_length(ticks),
         Event::Made { ticks } => bar.inc(ticks),
     };
-    let manifest =
-        cli::thread_pool(args.jobs)?.install(|| ingest::ingest(&logs, &args.out, &config, &on))?;
+    let manifest = cli::thread_pool(args.jobs)?
+        .install(|| ingest::ingest(&logs, &args.out, &config, args.shard, &on))?;
     bar.finish_and_clear();
     eprint!("{}", manifest.report());
     let loss = !manifest.failed.is_empty() || manifest.logs.iter().any(|log| log.has_loss());

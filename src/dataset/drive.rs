@@ -17,14 +17,14 @@ use crate::{
         route::{Path, command},
     },
     drops::Reason,
-    error::Result,
+    error::{Error, Result},
     frame::{Conditions, Frame, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
         mapping::{Mapping, PoseSource},
         profile::Profile,
         reader::Place,
-        recording::{Recording, Series, Stamped, Topic, mapping_error},
+        recording::{Recording, Series, Stamped, Topic, Unused, mapping_error},
         signals::{self, Pose},
     },
     projection::{Camera, Crop},
@@ -105,17 +105,20 @@ impl Drive {
                         `pmp-ingest inspect LOG` shows its topics";
             return Err(mapping_error(&recording.log, what.to_string(), hint));
         }
-        let mapping = Mapping::choose(&recording, profile)?;
+        let unreadable = unreadable(&recording, profile);
+        let explain = |error| explained(error, &unreadable);
+        let mapping = Mapping::choose(&recording, profile).map_err(explain)?;
         let tolerance_ns = align::nanos(profile.tolerance_ms.ego);
-        let track = EgoTrack::new(&recording, &mapping, tolerance_ns)?;
+        let track = EgoTrack::new(&recording, &mapping, tolerance_ns).map_err(explain)?;
         let topic = |name: &Option<String>| recording.topics.get(name.as_ref()?);
         let Some(camera_topic) = topic(&mapping.camera) else {
             let hint = "frames need a camera: sensor_msgs/CompressedImage or sensor_msgs/Image; \
                         `pmp-ingest inspect LOG` shows what the log has";
-            return Err(mapping_error(&recording.log, "no camera".into(), hint));
+            return Err(explain(mapping_error(&recording.log, "no camera".into(), hint)));
         };
 
         let mut notes = mapping.notes.clone();
+        notes.extend(unreadable.iter().cloned());
         notes.extend(clocks::notes(&recording, &mapping, profile));
         let mut left_out = clocks::check_overlap(&recording, &mapping, &profile.required, &track)?;
         notes.extend(track.notes.iter().cloned());
@@ -286,7 +289,7 @@ impl Drive {
         };
         let lidar = project(&self.lidar, &tick.lidar);
         let radar = project(&self.radar, &tick.radar);
-        let mut keep = |topic: &Topic, error: crate::error::Error| {
+        let mut keep = |topic: &Topic, error: Error| {
             damaged.push((topic.name.clone(), error.to_string()));
         };
         let lidar = lidar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
@@ -403,6 +406,25 @@ impl Sensor {
             if is_body { DQuat::from_xyzw(0.5, -0.5, 0.5, 0.5) } else { DQuat::IDENTITY };
         let optical_from_camera = Pose { position_m: DVec3::ZERO, rotation };
         Ok(Sensor { topic: sensor.name.clone(), optical_from_camera })
+    }
+}
+
+/// Topics that could be used if their encoding were read, each with the reason why it is not.
+fn unreadable(recording: &Recording, profile: &Profile) -> Vec<String> {
+    let could_be = recording.unused.iter().filter(|unused| unused.kind.is_some());
+    let not_ignored = could_be.filter(|unused| !profile.topics.ignore.contains(&unused.topic));
+    let tell = |unused: &Unused| format!("{} ({}): {}", unused.topic, unused.type_name, unused.why);
+    not_ignored.map(tell).collect()
+}
+
+/// An error about a signal that is missing, with the topics that were not read.
+fn explained(error: Error, unreadable: &[String]) -> Error {
+    match error {
+        Error::Mapping { path, what, hint } if !unreadable.is_empty() => {
+            let hint = format!("{hint}; topics that could not be read: {}", unreadable.join(", "));
+            Error::Mapping { path, what, hint }
+        }
+        error => error,
     }
 }
 

@@ -19,9 +19,10 @@ use std::{
 use rayon::prelude::*;
 
 use crate::{
-    atomic::{self, UNFINISHED, file_name, sha256_of_file},
+    atomic::{self, file_name, sha256_of_file},
     dataset::{
         account,
+        claim::Claim,
         drive::Drive,
         episode::Episode,
         episodes::write_episodes,
@@ -82,19 +83,25 @@ fn collect(folder: &Path, logs: &mut Vec<PathBuf>) -> Result<()> {
 
 /// Ingest logs into a dataset, on as many threads as the current rayon pool has.
 ///
-/// A log that fails does not stop the others; it is named in the manifest.
+/// A log that fails does not stop the others; it is named in the manifest. A `share` commits its
+/// logs and writes no manifest: that is left to a run without share, which finds them committed.
 ///
 /// # Errors
 ///
-/// If the output folder is something else or another dataset, if the disk refuses, or if every
-/// log fails (then with the first one's error).
+/// If the output folder is something else or another dataset, if another process is at work there,
+/// if the disk refuses, or if every log fails (then with the first one's error).
 pub fn ingest(
     logs: &[PathBuf],
     out: &Path,
     config: &IngestConfig,
+    share: Option<Share>,
     on: &(dyn Fn(Event) + Sync),
 ) -> Result<Manifest> {
-    let finished = prepare(out, config)?;
+    let claim = Claim::new(out, config, share.is_some())?;
+    let logs: Vec<PathBuf> = match share {
+        Some(share) => share.of(logs),
+        None => logs.to_vec(),
+    };
     let hashes: Vec<Result<String>> = logs.par_iter().map(|log| sha256_of_file(log)).collect();
     let mut jobs: Vec<Source> = Vec::new();
     let mut failed = Vec::new();
@@ -122,18 +129,18 @@ pub fn ingest(
             },
         }
     }
-    if let Some(finished) = finished {
-        return same_logs(finished, &jobs, out);
+    if Manifest::path(out).exists() {
+        return same_logs(Manifest::read(out)?, &jobs, out);
     }
 
     // Either the logs keep all threads busy or the blocks of one log do, never both: a thread
     // that waits for its blocks would start another log and hold both in memory.
     let by_log = jobs.len() >= rayon::current_num_threads();
     let records: Vec<Result<LogRecord>> = if by_log {
-        jobs.par_iter().map(|job| job.ingest(out, config, 1, on)).collect()
+        jobs.par_iter().map(|job| job.commit(&claim, config, 1, on)).collect()
     } else {
         let blocks = 2 * rayon::current_num_threads();
-        jobs.iter().map(|job| job.ingest(out, config, blocks, on)).collect()
+        jobs.iter().map(|job| job.commit(&claim, config, blocks, on)).collect()
     };
     let mut committed = Vec::new();
     for (job, record) in jobs.iter().zip(records) {
@@ -147,32 +154,79 @@ pub fn ingest(
             }
         }
     }
-    if committed.is_empty() {
-        // Nothing that looks like a dataset stays behind.
-        clean_up(out)?;
+    let has_nothing_to_do = jobs.is_empty() && failed.is_empty() && share.is_some();
+    if committed.is_empty() && !has_nothing_to_do {
+        claim.abandon()?;
         let nothing = || Error::Config { key: "LOG".into(), what: "no log".into(), hint: None };
         return Err(first_error.unwrap_or_else(nothing));
     }
     let manifest = Manifest::new(config.clone(), committed, failed);
+    if share.is_some() {
+        return Ok(manifest);
+    }
     write_episodes(&out.join("episodes.parquet"), &manifest.logs)?;
     atomic::write_json(&Manifest::path(out), &manifest)?;
     Ok(manifest)
 }
 
+/// One of several parts of the work, for a process of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// From 1.
+    pub number: usize,
+    pub of: usize,
+}
+
+impl Share {
+    /// `i/n`, as the flag `--shard` has it.
+    ///
+    /// # Errors
+    ///
+    /// A sentence that says what is wrong.
+    pub fn parse(text: &str) -> Result<Share, String> {
+        let numbers = text.split_once('/');
+        let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((number, of)) if (1..=of).contains(&number) => Ok(Share { number, of }),
+            _ => Err("it is i/n with 1 <= i <= n, as in 2/8".to_string()),
+        }
+    }
+
+    /// Its logs, by their place in the list of all: every process is given the same list.
+    fn of(self, logs: &[PathBuf]) -> Vec<PathBuf> {
+        logs.iter().skip(self.number - 1).step_by(self.of).cloned().collect()
+    }
+}
+
 impl Source {
     /// Commit the log, or find that it is committed.
-    fn ingest(
+    fn commit(
         &self,
-        out: &Path,
+        claim: &Claim,
         config: &IngestConfig,
         blocks_at_once: usize,
         on: &(dyn Fn(Event) + Sync),
     ) -> Result<LogRecord> {
+        let held = claim.hold(&self.episode)?;
+        let record = self.ingest(claim, config, blocks_at_once, on);
+        held.release()?;
+        record
+    }
+
+    fn ingest(
+        &self,
+        claim: &Claim,
+        config: &IngestConfig,
+        blocks_at_once: usize,
+        on: &(dyn Fn(Event) + Sync),
+    ) -> Result<LogRecord> {
+        let out = &claim.out;
         let record_path = out.join("logs").join(format!("{}.json", self.episode));
         if record_path.exists() {
             let record: LogRecord = atomic::read_json(&record_path)?;
-            // The same bytes under another name have another record.
-            let is_own = record.source_log == file_name(&self.path);
+            // The same bytes under another name have another record; which one stays is for the
+            // process to say that sees all names.
+            let is_own = claim.is_share || record.source_log == file_name(&self.path);
             if is_own && record.shards.iter().all(|shard| is_whole(out, shard)) {
                 return Ok(record);
             }
@@ -217,39 +271,6 @@ impl Source {
     }
 }
 
-/// Make the output folder ready; the manifest, if the dataset is finished already.
-fn prepare(out: &Path, config: &IngestConfig) -> Result<Option<Manifest>> {
-    let marker = out.join("ingest.json");
-    let fail = |what: &str, hint: &str| {
-        let (path, what, hint) = (out.to_path_buf(), what.to_string(), Some(hint.to_string()));
-        Err(Error::Dataset { path, what, hint })
-    };
-    if marker.exists() {
-        let found: IngestConfig = atomic::read_json(&marker)?;
-        if found != *config {
-            return fail(
-                "a dataset made with another configuration",
-                "choose another --out: a dataset is never changed",
-            );
-        }
-        if Manifest::path(out).exists() {
-            return Manifest::read(out).map(Some);
-        }
-        remove_unfinished(out)?;
-        return Ok(None);
-    }
-    let is_empty = match fs::read_dir(out) {
-        Ok(mut entries) => entries.next().is_none(),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => true,
-        Err(error) => return Err(Error::io("read", out)(error)),
-    };
-    if !is_empty {
-        return fail("a folder that is not empty and no dataset", "choose another --out");
-    }
-    atomic::write_json(&marker, config)?;
-    Ok(None)
-}
-
 /// A finished dataset is answered with itself, if it was made from these logs.
 fn same_logs(finished: Manifest, jobs: &[Source], out: &Path) -> Result<Manifest> {
     let has: Vec<&str> = finished.logs.iter().map(|log| log.episode.as_str()).collect();
@@ -276,29 +297,4 @@ fn is_whole(out: &Path, shard: &ShardRecord) -> bool {
     let path = out.join(&shard.path);
     fs::metadata(&path).is_ok_and(|metadata| metadata.len() == shard.bytes)
         && sha256_of_file(&path).is_ok_and(|sha256| sha256 == shard.sha256)
-}
-
-/// What a killed process was writing.
-fn remove_unfinished(folder: &Path) -> Result<()> {
-    for entry in fs::read_dir(folder).map_err(Error::io("read", folder))? {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        if path.is_dir() {
-            remove_unfinished(&path)?;
-        } else if path.extension().is_some_and(|extension| extension == UNFINISHED) {
-            fs::remove_file(&path).map_err(Error::io("remove", &path))?;
-        }
-    }
-    Ok(())
-}
-
-/// Undo [`prepare`] where nothing came of any log.
-fn clean_up(out: &Path) -> Result<()> {
-    remove_unfinished(out)?;
-    let marker = out.join("ingest.json");
-    fs::remove_file(&marker).map_err(Error::io("remove", &marker))?;
-    for folder in ["frames/split=train", "frames/split=val", "frames", "logs", ""] {
-        // Only empty folders go; what somebody else put there stays.
-        let _ = fs::remove_dir(out.join(folder));
-    }
-    Ok(())
 }

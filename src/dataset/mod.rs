@@ -3,7 +3,7 @@
 //! ```text
 //! samples -> ego (pose, velocity) -> future, route, control   labels
 //!         -> align (grid) -> drive (frames: picture, ralidar) -> columns -> shard
-//! episode: a drive made and written; record: of all of a log's; account: what became of its messages; skew
+//! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! ingest: one log after the other, each committed alone; split, manifest, episodes, summary, inspect
 //! open (which frames train, which judge) -> order -> sample -> batch, by loader
 //! ```
@@ -28,6 +28,7 @@ pub mod episodes;
 pub mod summary;
 pub mod episode;
 pub mod record;
+pub mod claim;
 pub mod ingest;
 pub mod inspect;
 pub mod open;

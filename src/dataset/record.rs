@@ -70,7 +70,9 @@ impl Parts {
         for topic in recording.topics.values() {
             let (count, why) = &topic.undecodable;
             if *count > 0 {
-                let why = why.clone().unwrap_or_default();
+                let at = topic.first_undecodable.map(|place| recording.log.offset_of(place));
+                let why =
+                    format!("{}; at byte {}", why.as_deref().unwrap_or_default(), at.unwrap_or(0));
                 self.undecodable.entry(topic.name.clone()).or_insert((0, why)).0 += count;
             }
             if topic.out_of_order > 0 {

@@ -28,6 +28,15 @@ pub const MAX_RECORD_BYTES: u64 = 512 << 20;
 /// Messages outside chunks are fetched in pieces of this size.
 const PLAIN_SEGMENT_BYTES: u64 = 4 << 20;
 
+/// What is given by mistake: first bytes, name, what to do.
+const FOREIGN: [(&[u8], &str, &str); 5] = [
+    (b"#ROSBAG", "a ROS 1 bag", "convert it with `mcap convert in.bag out.mcap`"),
+    (b"SQLite", "an SQLite database (rosbag2)", "convert it with `mcap convert in.db3 out.mcap`"),
+    (b"\x1f\x8b", "a gzip file", "unpack it with `gunzip`"),
+    (b"PK", "a zip archive", "unpack it with `unzip`"),
+    (b"\x28\xb5\x2f\xfd", "a zstd file", "unpack it with `unzstd`"),
+];
+
 const RECORD_HEADER_BYTES: u64 = 9;
 const MESSAGE_HEADER_BYTES: usize = 22;
 
@@ -140,6 +149,14 @@ impl Log {
         self.channels.values().any(|channel| channel.topic == topic)
     }
 
+    /// Where in the file a message lies, or the chunk that holds it.
+    pub fn offset_of(&self, place: Place) -> u64 {
+        match &self.segments[place.segment as usize] {
+            Segment::Chunk { data_offset, .. } => *data_offset,
+            Segment::Plain { offset, .. } => offset + u64::from(place.start),
+        }
+    }
+
     /// The bytes of a segment, decompressed; [`Place`]s point into them.
     ///
     /// # Errors
@@ -170,12 +187,15 @@ impl Log {
             return fail("the file is empty", "was the recorder stopped before it wrote anything?");
         }
         let head = self.read_at(0, self.size_bytes.min(mcap::MAGIC.len() as u64))?;
-        match head == mcap::MAGIC {
-            true => Ok(()),
-            false => fail(
-                "this is not an MCAP file: its first bytes are not the MCAP magic",
-                "rosbag2 .db3 and ROS 1 .bag files can be converted with `mcap convert`",
-            ),
+        if head == mcap::MAGIC {
+            return Ok(());
+        }
+        let what = "this is not an MCAP file: its first bytes are not the MCAP magic";
+        match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
+            Some((_, name, hint)) => fail(&format!("{what} but those of {name}"), hint),
+            None => {
+                fail(what, "rosbag2 .db3 and ROS 1 .bag files can be converted with `mcap convert`")
+            }
         }
     }
 

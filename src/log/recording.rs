@@ -67,8 +67,9 @@ pub struct Topic {
     pub uses_log_time: bool,
     /// Messages, of whatever became of them.
     pub messages: u64,
-    /// Messages that could not be decoded, and where and why the first could not.
+    /// Messages that could not be decoded, and why the first could not.
     pub undecodable: (u64, Option<String>),
+    pub first_undecodable: Option<Place>,
     /// Messages that came after one with a later stamp.
     pub out_of_order: u64,
     /// Messages whose stamp another one had already.
@@ -181,6 +182,7 @@ impl Topic {
             uses_log_time: clock_of_topic == Clock::Header,
             messages: 0,
             undecodable: (0, None),
+            first_undecodable: None,
             out_of_order: 0,
             repeated: 0,
             unstamped: 0,

@@ -99,10 +99,13 @@ impl<'c> Builder<'c> {
         topic.messages += 1;
         if let Err(error) = outcome {
             topic.undecodable.0 += 1;
+            topic.first_undecodable.get_or_insert(message.place);
             topic.undecodable.1.get_or_insert_with(|| {
-                let number = topic.messages;
                 let at = instant_text(message.log_time_ns);
-                format!("first: message {number} of the topic, logged at {at}: {error}")
+                format!(
+                    "the first, message {} of the topic, logged at {at}: {error}",
+                    topic.messages
+                )
             });
         }
     }

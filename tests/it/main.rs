@@ -16,6 +16,9 @@ mod protobuf;
 mod logs;
 mod alignment;
 mod ingest;
+mod clocks;
+mod accounts;
+mod shares;
 mod real_drive;
 #[cfg(feature = "learning")]
 mod evaluation;
