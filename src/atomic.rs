@@ -21,6 +21,11 @@ pub fn unfinished_name(path: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// The name of a file without its folder.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
 /// A file under a temporary name until [`commit`](AtomicFile::commit).
 #[derive(Debug)]
 pub struct AtomicFile {

@@ -73,6 +73,14 @@ impl Drops {
         }
     }
 
+    /// Count what was counted elsewhere.
+    pub fn extend(&mut self, other: &Drops) {
+        for (reason, drop) in &other.0 {
+            let sum = self.0.entry(*reason).or_insert(Drop { count: 0, ..drop.clone() });
+            sum.count += drop.count;
+        }
+    }
+
     pub fn count(&self, reason: Reason) -> u64 {
         self.0.get(&reason).map_or(0, |drop| drop.count)
     }

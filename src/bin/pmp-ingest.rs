@@ -6,18 +6,21 @@ use clap::{Args, Parser, Subcommand};
 use pmp::{
     cli::{self, Outcome},
     dataset::{
-        ingest::{self, Event},
+        ingest::{self, Event, Share},
         inspect, manifest,
     },
     error::Result,
     frame::GRID_HZ,
-    log::profile::Profile,
+    log::{
+        clock::{self, Clock},
+        profile::Profile,
+    },
 };
 
 /// Turn MCAP driving logs into a sharded Parquet dataset
 ///
 /// Topics are found by their type (`pmp-ingest inspect LOG` shows which), aligned by header stamp
-/// to a 10 Hz grid, and written as frames: camera, lidar and radar on the picture, ego motion,
+/// (or as `--clock` and `--offset` say) to a 10 Hz grid, and written as frames: camera, lidar and radar on the picture, ego motion,
 /// route, what the driver did, and 3 s of what the car did next. Ticks where a needed signal has a
 /// gap are left out and counted, never filled.
 ///
@@ -42,6 +45,12 @@ enum Inspect {
         /// `auto`, `carla-ros-bridge`, or a FILE.toml
         #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
         profile: String,
+        /// Stamp a topic's messages by another instant than their header's
+        #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
+        clock: Vec<(String, Clock)>,
+        /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
+        #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
+        offset: Vec<(String, f64)>,
         /// Print JSON
         #[arg(long)]
         json: bool,
@@ -62,19 +71,44 @@ struct Ingest {
     #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
     profile: String,
 
+    /// Stamp a topic's messages by another instant than their header's
+    #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
+    clock: Vec<(String, Clock)>,
+
+    /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
+    #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
+    offset: Vec<(String, f64)>,
+
     /// Ticks a second
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
     rate: f64,
+
+    /// Commit only the i-th of n parts of the logs; when all parts are done, the same command
+    /// without --shard finishes the dataset
+    #[arg(long, value_name = "i/n", value_parser = Share::parse)]
+    shard: Option<Share>,
 
     /// Threads [default: all cores]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
 }
 
+/// A profile, with what flags say of clocks in place of what it says.
+fn profile(name: &str, clocks: &[(String, Clock)], offsets: &[(String, f64)]) -> Result<Profile> {
+    let mut profile = Profile::load(name)?;
+    profile.clock.topics.extend(clocks.iter().cloned());
+    profile.clock.offset_s.extend(offsets.iter().cloned());
+    profile.check()?;
+    Ok(profile)
+}
+
+const CLOCK: &str = "TOPIC=header|log|publish";
+
 const EXAMPLES: &str = "\
 Examples:
   pmp-ingest --out data drives/              all logs below a folder
   pmp-ingest --out data a.mcap b.mcap --profile my-car.toml
+  pmp-ingest --out data drives/ --shard 2/8  the second of eight processes that share the work
   pmp-ingest inspect a.mcap                  what is in a log, and what would be used
 
 Exit codes: 0 everything was used; 3 something was left out, the report says what; 1 failed; 2 misused";
@@ -82,8 +116,8 @@ Exit codes: 0 everything was used; 3 something was left out, the report says wha
 fn main() -> ExitCode {
     let cli = Cli::parse();
     cli::main(|| match (cli.command, cli.ingest) {
-        (Some(Inspect::Inspect { log, profile, json }), _) => {
-            let report = inspect::inspect(&log, &Profile::load(&profile)?)?;
+        (Some(Inspect::Inspect { log, profile: name, clock, offset, json }), _) => {
+            let report = inspect::inspect(&log, &profile(&name, &clock, &offset)?)?;
             cli::print(&if json { report.json() } else { report.to_string() })?;
             Ok(Outcome::Done)
         }
@@ -94,14 +128,15 @@ fn main() -> ExitCode {
 
 fn run(args: &Ingest) -> Result<Outcome> {
     let logs = ingest::find_logs(&args.logs)?;
-    let config = manifest::IngestConfig::new(Profile::load(&args.profile)?, args.rate)?;
+    let profile = profile(&args.profile, &args.clock, &args.offset)?;
+    let config = manifest::IngestConfig::new(profile, args.rate)?;
     let bar = cli::progress(0, "frames", "ingest");
     let on = |event| match event {
         Event::Opened { ticks } => bar.inc_length(ticks),
         Event::Made { ticks } => bar.inc(ticks),
     };
-    let manifest =
-        cli::thread_pool(args.jobs)?.install(|| ingest::ingest(&logs, &args.out, &config, &on))?;
+    let manifest = cli::thread_pool(args.jobs)?
+        .install(|| ingest::ingest(&logs, &args.out, &config, args.shard, &on))?;
     bar.finish_and_clear();
     eprint!("{}", manifest.report());
     let loss = !manifest.failed.is_empty() || manifest.logs.iter().any(|log| log.has_loss());

@@ -5,6 +5,8 @@
 //! tolerance, interpolates the ego motion between its neighbours, and is left out where a
 //! required signal has nothing near: nothing is filled across a gap.
 
+use std::collections::BTreeSet;
+
 use crate::{
     dataset::ego::{EgoState, EgoTrack},
     drops::{Drops, Reason},
@@ -45,8 +47,21 @@ pub struct Grid {
     pub ticks: Vec<Tick>,
     /// Ticks that will not.
     pub drops: Drops,
+    /// Samples that belong to those.
+    pub dropped: SampleStamps,
     /// Stamp of tick 0, ns since the Unix epoch.
     pub start_ns: i64,
+    /// Stamp of the last tick, ns since the Unix epoch.
+    pub end_ns: i64,
+}
+
+/// Samples by their stamps.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SampleStamps {
+    pub camera: BTreeSet<i64>,
+    pub lidar: BTreeSet<i64>,
+    pub radar: BTreeSet<i64>,
+    pub control: BTreeSet<i64>,
 }
 
 /// Lay the grid over a drive; `None` if there is no instant at which all required signals exist.
@@ -58,8 +73,14 @@ pub fn align(
 ) -> Option<Grid> {
     let (start_ns, end_ns) = common_span(signals, required)?;
     let near = |samples, stamp_ns, tolerance_ms| within(samples, stamp_ns, nanos(tolerance_ms));
-    let mut grid = Grid { ticks: Vec::new(), drops: Drops::default(), start_ns };
     let last = (end_ns - start_ns) / period_ns;
+    let mut grid = Grid {
+        ticks: Vec::new(),
+        drops: Drops::default(),
+        dropped: SampleStamps::default(),
+        start_ns,
+        end_ns: start_ns + last * period_ns,
+    };
     let mut at = 0;
     while at <= last {
         let stamp_ns = start_ns + at * period_ns;
@@ -92,7 +113,14 @@ pub fn align(
             (None, Some(image), Some(ego)) => {
                 grid.ticks.push(Tick { index, stamp_ns, ego, image, lidar, radar, control });
             }
-            (Some(reason), ..) => grid.drops.add(reason, stamp_ns, None),
+            (Some(reason), image, _) => {
+                grid.drops.add(reason, stamp_ns, None);
+                let stamp = |sample: Option<Stamped<Place>>| sample.map(|sample| sample.stamp_ns);
+                grid.dropped.camera.extend(stamp(image));
+                grid.dropped.lidar.extend(stamp(lidar));
+                grid.dropped.radar.extend(stamp(radar));
+                grid.dropped.control.extend(control.map(|sample| sample.stamp_ns));
+            }
             (None, ..) => unreachable!("a missing image or ego state is a reason"),
         }
     }

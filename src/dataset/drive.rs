@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     dataset::{
         align::{self, Grid, Signals, Tick},
+        clocks,
         control::Controls,
         ego::EgoTrack,
         future::future,
@@ -16,14 +17,14 @@ use crate::{
         route::{Path, command},
     },
     drops::Reason,
-    error::Result,
+    error::{Error, Result},
     frame::{Conditions, Frame, LidarPixels, RadarPixels, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
         mapping::{Mapping, PoseSource},
         profile::{CameraRule, Profile},
         reader::{Place, SegmentReader},
-        recording::{Recording, Series, Stamped, Topic, mapping_error},
+        recording::{Recording, Series, Stamped, Topic, Unused, mapping_error},
         signals::{self, Pose},
     },
     projection::{Camera, Crop},
@@ -45,6 +46,8 @@ pub struct Drive {
     pub left_out: Vec<String>,
     /// Width and height of the recorded pictures.
     picture_size: (usize, usize),
+    /// The topic of what moved the car, where that is not always what the driver wanted.
+    pub applied_control: Option<String>,
     controls: Controls,
     track: EgoTrack,
     driven: Path,
@@ -95,33 +98,45 @@ pub struct Calibration {
 }
 
 impl Drive {
-    /// Scan a log, choose its topics and lay the grid.
+    /// Scan a log and open its first drive; [`Recording::scan`] gives all of them.
     ///
     /// # Errors
     ///
-    /// If the file is no readable log, has no messages, lacks a camera or an ego pose, has a
-    /// lidar or radar that cannot be placed relative to the camera, or if the profile names a
-    /// topic that is not there.
+    /// If the file is no readable log, and as [`Drive::new`].
     pub fn open(path: &FilePath, profile: &Profile, rate_hz: f64) -> Result<Drive> {
-        let recording = Recording::scan(path)?;
+        Drive::new(Recording::scan(path, &profile.clock)?.swap_remove(0), profile, rate_hz)
+    }
+
+    /// Choose the topics of a recording and lay the grid.
+    ///
+    /// # Errors
+    ///
+    /// If the log has no messages, lacks a camera or an ego pose, has a lidar or radar that cannot
+    /// be placed relative to the camera, has streams whose stamps do not overlap, or if the profile
+    /// names a topic that is not there.
+    pub fn new(recording: Recording, profile: &Profile, rate_hz: f64) -> Result<Drive> {
         if recording.log.message_count() == 0 {
             let what = "the log has no messages";
             let hint = "was anything published while it was recorded? \
                         `pmp-ingest inspect LOG` shows its topics";
             return Err(mapping_error(&recording.log, what.to_string(), hint));
         }
-        let mapping = Mapping::choose(&recording, profile)?;
+        let unreadable = unreadable(&recording, profile);
+        let explain = |error| explained(error, &unreadable);
+        let mapping = Mapping::choose(&recording, profile).map_err(explain)?;
         let tolerance_ns = align::nanos(profile.tolerance_ms.ego);
-        let track = EgoTrack::new(&recording, &mapping, tolerance_ns)?;
+        let track = EgoTrack::new(&recording, &mapping, tolerance_ns).map_err(explain)?;
         let topic = |name: &Option<String>| recording.topics.get(name.as_ref()?);
         let Some(camera_topic) = topic(&mapping.camera) else {
             let hint = "frames need a camera: sensor_msgs/CompressedImage or sensor_msgs/Image; \
                         `pmp-ingest inspect LOG` shows what the log has";
-            return Err(mapping_error(&recording.log, "no camera".into(), hint));
+            return Err(explain(mapping_error(&recording.log, "no camera".into(), hint)));
         };
 
         let mut notes = mapping.notes.clone();
-        let mut left_out = Vec::new();
+        notes.extend(unreadable.iter().cloned());
+        notes.extend(clocks::notes(&recording, &mapping, profile));
+        let mut left_out = clocks::check_overlap(&recording, &mapping, &profile.required, &track)?;
         notes.extend(track.notes.iter().cloned());
         let applied = recording.log.metadata.get(CONDITIONS_RECORD);
         let applied = applied.and_then(|record| record.get(APPLIED_CONTROL)).cloned();
@@ -196,6 +211,7 @@ impl Drive {
             picture_size,
             notes,
             left_out,
+            applied_control: applied,
             controls,
             track,
             driven,
@@ -204,6 +220,16 @@ impl Drive {
             radar,
             recording,
         })
+    }
+
+    /// Whether frames can have lidar returns.
+    pub fn has_lidar(&self) -> bool {
+        self.lidar.is_some()
+    }
+
+    /// Whether frames can have radar returns.
+    pub fn has_radar(&self) -> bool {
+        self.radar.is_some()
     }
 
     /// What is worth keeping beside the frames.
@@ -444,6 +470,25 @@ impl Sensor {
             if is_body { DQuat::from_xyzw(0.5, -0.5, 0.5, 0.5) } else { DQuat::IDENTITY };
         let optical_from_camera = Pose { position_m: DVec3::ZERO, rotation };
         Ok(Sensor { topic: sensor.name.clone(), optical_from_camera })
+    }
+}
+
+/// Topics that could be used if their encoding were read, each with the reason why it is not.
+fn unreadable(recording: &Recording, profile: &Profile) -> Vec<String> {
+    let could_be = recording.unused.iter().filter(|unused| unused.kind.is_some());
+    let not_ignored = could_be.filter(|unused| !profile.topics.ignore.contains(&unused.topic));
+    let tell = |unused: &Unused| format!("{} ({}): {}", unused.topic, unused.type_name, unused.why);
+    not_ignored.map(tell).collect()
+}
+
+/// An error about a signal that is missing, with the topics that were not read.
+fn explained(error: Error, unreadable: &[String]) -> Error {
+    match error {
+        Error::Mapping { path, what, hint } if !unreadable.is_empty() => {
+            let hint = format!("{hint}; topics that could not be read: {}", unreadable.join(", "));
+            Error::Mapping { path, what, hint }
+        }
+        error => error,
     }
 }
 

@@ -19,18 +19,20 @@ use std::{
 use rayon::prelude::*;
 
 use crate::{
-    atomic::{self, UNFINISHED, sha256_of_file},
+    atomic::{self, file_name, sha256_of_file},
     dataset::{
-        align::Tick,
+        account,
+        claim::Claim,
         compaction::{compact, remove_leftovers},
         drive::Drive,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
-        shard::{ROWS_PER_GROUP, ROWS_PER_SHARD, ShardRecord, ShardWriter},
-        split::Split,
+        episode::Episode,
+        episodes::write_episodes,
+        manifest::{FailedLog, IngestConfig, LogRecord, Manifest},
+        record::{Parts, Source},
+        shard::ShardRecord,
     },
-    drops::Drops,
     error::{Error, Result},
-    frame::{FUTURE_STEPS, Frame},
+    log::recording::Recording,
 };
 
 /// What an ingest tells while it runs.
@@ -83,21 +85,27 @@ fn collect(folder: &Path, logs: &mut Vec<PathBuf>) -> Result<()> {
 
 /// Ingest logs into a dataset, on as many threads as the current rayon pool has.
 ///
-/// A log that fails does not stop the others; it is named in the manifest.
+/// A log that fails does not stop the others; it is named in the manifest. A `share` commits its
+/// logs and writes no manifest: that is left to a run without share, which finds them committed.
 ///
 /// # Errors
 ///
-/// If the output folder is something else or another dataset, if the disk refuses, or if every
-/// log fails (then with the first one's error).
+/// If the output folder is something else or another dataset, if another process is at work there,
+/// if the disk refuses, or if every log fails (then with the first one's error).
 pub fn ingest(
     logs: &[PathBuf],
     out: &Path,
     config: &IngestConfig,
+    share: Option<Share>,
     on: &(dyn Fn(Event) + Sync),
 ) -> Result<Manifest> {
-    let finished = prepare(out, config)?;
+    let claim = Claim::new(out, config, share.is_some())?;
+    let logs: Vec<PathBuf> = match share {
+        Some(share) => share.of(logs),
+        None => logs.to_vec(),
+    };
     let hashes: Vec<Result<String>> = logs.par_iter().map(|log| sha256_of_file(log)).collect();
-    let mut jobs: Vec<Job> = Vec::new();
+    let mut jobs: Vec<Source> = Vec::new();
     let mut failed = Vec::new();
     let mut first_error = None;
     let mut fail = |log: &Path, error: Error| {
@@ -118,41 +126,44 @@ pub fn ingest(
                 }
                 None => {
                     seen.insert(sha256.clone(), log);
-                    jobs.push(Job { log: log.clone(), episode: episode_id(&sha256), sha256 });
+                    jobs.push(Source::new(log.clone(), sha256));
                 }
             },
         }
     }
-    if let Some(finished) = finished {
-        return same_logs(finished, &jobs, out);
+    if Manifest::path(out).exists() {
+        return same_logs(Manifest::read(out)?, &jobs, out);
     }
 
     // Either the logs keep all threads busy or the blocks of one log do, never both: a thread
     // that waits for its blocks would start another log and hold both in memory.
     let by_log = jobs.len() >= rayon::current_num_threads();
     let records: Vec<Result<LogRecord>> = if by_log {
-        jobs.par_iter().map(|job| job.run(out, config, 1, on)).collect()
+        jobs.par_iter().map(|job| job.commit(&claim, config, 1, on)).collect()
     } else {
         let blocks = 2 * rayon::current_num_threads();
-        jobs.iter().map(|job| job.run(out, config, blocks, on)).collect()
+        jobs.iter().map(|job| job.commit(&claim, config, blocks, on)).collect()
     };
     let mut committed = Vec::new();
     for (job, record) in jobs.iter().zip(records) {
         match record {
             Ok(record) => committed.push(record),
             // The disk is the same for all logs: what it refuses once is no matter of one log.
-            Err(error @ Error::Io { .. }) if fs::metadata(&job.log).is_ok() => return Err(error),
+            Err(error @ Error::Io { .. }) if fs::metadata(&job.path).is_ok() => return Err(error),
             Err(error) => {
-                job.discard(out)?;
-                fail(&job.log, error);
+                job.discard(out, &job.episode)?;
+                fail(&job.path, error);
             }
         }
     }
-    if committed.is_empty() {
-        // Nothing that looks like a dataset stays behind.
-        clean_up(out)?;
+    let has_nothing_to_do = jobs.is_empty() && failed.is_empty() && share.is_some();
+    if committed.is_empty() && !has_nothing_to_do {
+        claim.abandon()?;
         let nothing = || Error::Config { key: "LOG".into(), what: "no log".into(), hint: None };
         return Err(first_error.unwrap_or_else(nothing));
+    }
+    if share.is_some() {
+        return Ok(Manifest::new(config.clone(), committed, failed));
     }
     compact(out, &mut committed)?;
     let manifest = Manifest::new(config.clone(), committed, failed);
@@ -162,204 +173,117 @@ pub fn ingest(
     Ok(manifest)
 }
 
-/// A log to ingest.
-struct Job {
-    log: PathBuf,
-    episode: String,
-    sha256: String,
+/// One of several parts of the work, for a process of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// From 1.
+    pub number: usize,
+    pub of: usize,
 }
 
-impl Job {
+impl Share {
+    /// `i/n`, as the flag `--shard` has it.
+    ///
+    /// # Errors
+    ///
+    /// A sentence that says what is wrong.
+    pub fn parse(text: &str) -> Result<Share, String> {
+        let numbers = text.split_once('/');
+        let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((number, of)) if (1..=of).contains(&number) => Ok(Share { number, of }),
+            _ => Err("it is i/n with 1 <= i <= n, as in 2/8".to_string()),
+        }
+    }
+
+    /// Its logs, by their place in the list of all: every process is given the same list.
+    fn of(self, logs: &[PathBuf]) -> Vec<PathBuf> {
+        logs.iter().skip(self.number - 1).step_by(self.of).cloned().collect()
+    }
+}
+
+impl Source {
     /// Commit the log, or find that it is committed.
-    fn run(
+    fn commit(
         &self,
-        out: &Path,
+        claim: &Claim,
         config: &IngestConfig,
         blocks_at_once: usize,
         on: &(dyn Fn(Event) + Sync),
     ) -> Result<LogRecord> {
+        let held = claim.hold(&self.episode)?;
+        let record = self.ingest(claim, config, blocks_at_once, on);
+        held.release()?;
+        record
+    }
+
+    fn ingest(
+        &self,
+        claim: &Claim,
+        config: &IngestConfig,
+        blocks_at_once: usize,
+        on: &(dyn Fn(Event) + Sync),
+    ) -> Result<LogRecord> {
+        let out = &claim.out;
         let record_path = out.join("logs").join(format!("{}.json", self.episode));
         if record_path.exists() {
             let record: LogRecord = atomic::read_json(&record_path)?;
-            if record.shards.iter().all(|shard| is_whole(out, shard)) {
+            // The same bytes under another name have another record; which one stays is for the
+            // process to say that sees all names.
+            let is_own = claim.is_share || record.source_log == file_name(&self.path);
+            if is_own && record.shards.iter().all(|shard| is_whole(out, shard)) {
                 return Ok(record);
             }
         }
-        let drive = Drive::open(&self.log, &config.profile, config.rate_hz)?;
-        on(Event::Opened { ticks: drive.grid.ticks.len() as u64 });
-        let made = self.write_shards(&drive, out, blocks_at_once, on)?;
-        if made.frames == 0 {
-            let what = format!("no frame: {} ticks were left out", made.drops.total());
-            let reasons: Vec<_> =
-                made.drops.iter().map(|(r, d)| format!("{} {}", d.count, r.name())).collect();
-            let hint = format!("by reason: {}", reasons.join(", "));
-            return Err(Error::Mapping { path: self.log.clone(), what, hint });
+        let mut parts = Parts::default();
+        for recording in Recording::scan(&self.path, &config.profile.clock)? {
+            parts.scanned(&recording);
+            let lost = account::without_frames(&recording);
+            let id = parts.next_id(self);
+            let write = || {
+                let drive = Drive::new(recording, &config.profile, config.rate_hz)?;
+                on(Event::Opened { ticks: drive.grid.ticks.len() as u64 });
+                let on = |ticks| on(Event::Made { ticks });
+                Episode::write(&drive, &id, self.split, out, blocks_at_once, &on)
+            };
+            match write() {
+                Ok(episode) => parts.made(episode),
+                Err(error @ Error::Io { .. }) => return Err(error),
+                Err(error) => {
+                    self.discard(out, &id)?;
+                    parts.failed(error, lost);
+                }
+            }
         }
-        let recording = &drive.recording;
-        let mut undecodable = made.damaged;
-        for topic in recording.topics.values().filter(|topic| topic.undecodable.0 > 0) {
-            let (count, why) = topic.undecodable.clone();
-            let entry = undecodable.entry(topic.name.clone()).or_default();
-            *entry = (entry.0 + count, why.unwrap_or_default());
-        }
-        let out_of_order = recording.topics.values().filter(|topic| topic.out_of_order > 0);
-        let record = LogRecord {
-            episode: self.episode.clone(),
-            split: Split::of(&self.episode),
-            source_log: file_name(&self.log),
-            source_bytes: recording.log.size_bytes,
-            source_sha256: self.sha256.clone(),
-            messages: recording.log.message_count(),
-            conditions: drive.conditions.clone(),
-            mapping: drive.mapping.clone(),
-            calibration: drive.calibration(),
-            frames: made.frames,
-            frames_with_full_future: made.frames_with_full_future,
-            start_ns: drive.grid.start_ns,
-            duration_s: made.span_ns.map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9),
-            distance_m: drive.distance_m(),
-            drops: made.drops,
-            damage: recording.log.damage.clone(),
-            undecodable,
-            out_of_order: out_of_order.map(|t| (t.name.clone(), t.out_of_order)).collect(),
-            left_out: drive.left_out.clone(),
-            notes: drive.notes.clone(),
-            shards: made.shards,
-        };
+        let record = parts.record(self)?;
         atomic::write_json(&record_path, &record)?;
         Ok(record)
     }
 
-    /// Remove what a failed log had written: readers of the folder find committed frames only.
-    fn discard(&self, out: &Path) -> Result<()> {
-        let split = Split::of(&self.episode).name();
-        let folder = out.join("frames").join(format!("split={split}"));
+    /// Remove what was written of an episode that failed, or of a log by the id of its first:
+    /// readers of the folder find committed frames only.
+    fn discard(&self, out: &Path, id: &str) -> Result<()> {
+        let folder = out.join("frames").join(format!("split={}", self.split.name()));
         let Ok(entries) = fs::read_dir(&folder) else { return Ok(()) };
         for entry in entries {
             let path = entry.map_err(Error::io("read", &folder))?.path();
-            if file_name(&path).starts_with(&format!("{}-", self.episode)) {
+            if file_name(&path).starts_with(&format!("{id}-")) {
                 fs::remove_file(&path).map_err(Error::io("remove", &path))?;
             }
         }
         Ok(())
     }
-
-    fn write_shards(
-        &self,
-        drive: &Drive,
-        out: &Path,
-        blocks_at_once: usize,
-        on: &(dyn Fn(Event) + Sync),
-    ) -> Result<MadeFrames> {
-        let split = Split::of(&self.episode).name();
-        let mut made = MadeFrames { drops: drive.grid.drops.clone(), ..MadeFrames::default() };
-        for ticks in drive.grid.ticks.chunks(ROWS_PER_SHARD) {
-            let shard = made.shards.len();
-            let path = format!("frames/split={split}/{}-{shard:05}.parquet", self.episode);
-            let mut writer = ShardWriter::create(&out.join(&path))?;
-            let blocks: Vec<&[Tick]> = ticks.chunks(ROWS_PER_GROUP).collect();
-            for wave in blocks.chunks(blocks_at_once) {
-                let outcomes: Vec<_> = match wave {
-                    [block] => vec![drive.frames(block)],
-                    wave => wave.par_iter().map(|block| drive.frames(block)).collect(),
-                };
-                for outcome in outcomes {
-                    let outcome = outcome?;
-                    on(Event::Made { ticks: outcome.len() as u64 });
-                    let mut frames = Vec::with_capacity(outcome.len());
-                    for tick in outcome {
-                        made.note_damage(tick.damaged);
-                        match tick.frame {
-                            Ok(frame) => frames.push(*frame),
-                            Err((reason, at_ns, why)) => made.drops.add(reason, at_ns, Some(why)),
-                        }
-                    }
-                    if !frames.is_empty() {
-                        made.note_frames(&frames);
-                        writer.write(&self.episode, &frames)?;
-                    }
-                }
-            }
-            let rows = writer.rows() as u64;
-            let committed = writer.finish()?;
-            let (bytes, sha256) = (committed.bytes, committed.sha256);
-            made.shards.push(ShardRecord { path, rows, bytes, sha256, groups: None });
-        }
-        Ok(made)
-    }
-}
-
-/// What came of the ticks of a log.
-#[derive(Default)]
-struct MadeFrames {
-    frames: u64,
-    frames_with_full_future: u64,
-    span_ns: Option<(i64, i64)>,
-    drops: Drops,
-    damaged: BTreeMap<String, (u64, String)>,
-    shards: Vec<ShardRecord>,
-}
-
-impl MadeFrames {
-    fn note_frames(&mut self, frames: &[Frame]) {
-        let full = frames.iter().filter(|frame| usize::from(frame.future.len) == FUTURE_STEPS);
-        self.frames += frames.len() as u64;
-        self.frames_with_full_future += full.count() as u64;
-        if let (Some(first), Some(last)) = (frames.first(), frames.last()) {
-            let from = self.span_ns.map_or(first.stamp_ns, |(from, _)| from);
-            self.span_ns = Some((from, last.stamp_ns));
-        }
-    }
-
-    fn note_damage(&mut self, damaged: Vec<(String, String)>) {
-        for (topic, why) in damaged {
-            self.damaged.entry(topic).or_insert((0, why)).0 += 1;
-        }
-    }
-}
-
-/// Make the output folder ready; the manifest, if the dataset is finished already.
-fn prepare(out: &Path, config: &IngestConfig) -> Result<Option<Manifest>> {
-    let marker = out.join("ingest.json");
-    let fail = |what: &str, hint: &str| {
-        let (path, what, hint) = (out.to_path_buf(), what.to_string(), Some(hint.to_string()));
-        Err(Error::Dataset { path, what, hint })
-    };
-    if marker.exists() {
-        let found: IngestConfig = atomic::read_json(&marker)?;
-        if found != *config {
-            return fail(
-                "a dataset made with another configuration",
-                "choose another --out: a dataset is never changed",
-            );
-        }
-        if Manifest::path(out).exists() {
-            return Manifest::read(out).map(Some);
-        }
-        remove_unfinished(out)?;
-        return Ok(None);
-    }
-    let is_empty = match fs::read_dir(out) {
-        Ok(mut entries) => entries.next().is_none(),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => true,
-        Err(error) => return Err(Error::io("read", out)(error)),
-    };
-    if !is_empty {
-        return fail("a folder that is not empty and no dataset", "choose another --out");
-    }
-    atomic::write_json(&marker, config)?;
-    Ok(None)
 }
 
 /// A finished dataset is answered with itself, if it was made from these logs.
-fn same_logs(finished: Manifest, jobs: &[Job], out: &Path) -> Result<Manifest> {
+fn same_logs(finished: Manifest, jobs: &[Source], out: &Path) -> Result<Manifest> {
     let has: Vec<&str> = finished.logs.iter().map(|log| log.episode.as_str()).collect();
     let failed: Vec<&str> = finished.failed.iter().map(|log| log.source_log.as_str()).collect();
     let new = jobs.iter().find(|job| {
-        !has.contains(&job.episode.as_str()) && !failed.contains(&file_name(&job.log).as_str())
+        !has.contains(&job.episode.as_str()) && !failed.contains(&file_name(&job.path).as_str())
     });
     if let Some(job) = new {
-        let what = format!("a finished dataset, without {}", job.log.display());
+        let what = format!("a finished dataset, without {}", job.path.display());
         let hint = Some("choose another --out: a dataset is never changed".to_string());
         return Err(Error::Dataset { path: out.to_path_buf(), what, hint });
     }
@@ -379,38 +303,4 @@ fn is_whole(out: &Path, shard: &ShardRecord) -> bool {
     let path = out.join(&shard.path);
     fs::metadata(&path).is_ok_and(|metadata| metadata.len() == shard.bytes)
         && sha256_of_file(&path).is_ok_and(|sha256| sha256 == shard.sha256)
-}
-
-/// What a killed process was writing.
-fn remove_unfinished(folder: &Path) -> Result<()> {
-    for entry in fs::read_dir(folder).map_err(Error::io("read", folder))? {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        if path.is_dir() {
-            remove_unfinished(&path)?;
-        } else if path.extension().is_some_and(|extension| extension == UNFINISHED) {
-            fs::remove_file(&path).map_err(Error::io("remove", &path))?;
-        }
-    }
-    Ok(())
-}
-
-/// Undo [`prepare`] where nothing came of any log.
-fn clean_up(out: &Path) -> Result<()> {
-    remove_unfinished(out)?;
-    let marker = out.join("ingest.json");
-    fs::remove_file(&marker).map_err(Error::io("remove", &marker))?;
-    for folder in ["frames/split=train", "frames/split=val", "frames", "logs", ""] {
-        // Only empty folders go; what somebody else put there stays.
-        let _ = fs::remove_dir(out.join(folder));
-    }
-    Ok(())
-}
-
-/// The same for the same bytes on any machine.
-fn episode_id(sha256: &str) -> String {
-    format!("ep-{}", &sha256[..16])
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

@@ -48,8 +48,9 @@ pub struct LogReport {
 ///
 /// If the file is no readable log, or the profile names a topic that is not there.
 pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
-    let recording = Recording::scan(path)?;
-    let mapping = Mapping::choose(&recording, profile)?;
+    let recordings = Recording::scan(path, &profile.clock)?;
+    let recording = &recordings[0];
+    let mapping = Mapping::choose(recording, profile)?;
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for (id, count) in &recording.log.counts {
         *counts.entry(&recording.log.channels[id].topic).or_default() += count;

@@ -1,4 +1,4 @@
-//! What a dataset says of itself: `manifest.json`, one record a log, `episodes.parquet`.
+//! What a dataset says of itself: `manifest.json`, and one record a log.
 //!
 //! A log commits alone: first its shards, then its record under `logs/`. The manifest is put
 //! together from the records and written last, so its presence means that the dataset is whole.
@@ -7,24 +7,20 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
-use arrow::{
-    array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array, UInt64Array},
-    datatypes::{DataType, Field, Schema},
-};
-use parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    atomic::{self, AtomicFile},
-    dataset::{drive::Calibration, shard::ShardRecord, split::Split},
-    drops::{Drops, Reason},
+    atomic,
+    dataset::{
+        account::{LeftOut, TopicAccount},
+        drive::Calibration,
+        shard::ShardRecord,
+        skew::Skews,
+        split::Split,
+    },
+    drops::Drops,
     error::{Error, Result},
     frame::Conditions,
     log::{mapping::Mapping, profile::Profile, reader::Damage},
@@ -59,10 +55,34 @@ impl IngestConfig {
     }
 }
 
-/// A log, as committed.
+/// An episode of a log. A log has several where its clocks jump back.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeRecord {
+    pub id: String,
+    pub frames: u64,
+    /// Frames with all 30 steps of future.
+    pub frames_with_full_future: u64,
+    /// Stamp of tick 0, ns since the Unix epoch.
+    pub start_ns: i64,
+    /// From the first to the last frame.
+    pub duration_s: f64,
+    pub distance_m: f64,
+    /// Ticks left out, by reason.
+    pub drops: Drops,
+    pub mapping: Mapping,
+    pub calibration: Calibration,
+    /// What became of its messages, by topic.
+    pub topics: Vec<TopicAccount>,
+    /// How many of the log's shards are its own; they lie there in the order of the episodes.
+    pub shards: usize,
+}
+
+/// A log, as committed: what is said once, and the sums over its episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogRecord {
+    /// Id of the first episode.
     pub episode: String,
+    /// The same for all episodes of a log: they are one drive.
     pub split: Split,
     /// Name of the file, without its folder.
     pub source_log: String,
@@ -70,6 +90,7 @@ pub struct LogRecord {
     pub source_sha256: String,
     pub messages: u64,
     pub conditions: Conditions,
+    /// Of the first episode, as the calibration and the start.
     pub mapping: Mapping,
     pub calibration: Calibration,
     pub frames: u64,
@@ -84,7 +105,7 @@ pub struct LogRecord {
     pub drops: Drops,
     /// Parts of the file that could not be read.
     pub damage: Vec<Damage>,
-    /// Messages that could not be decoded, by topic: how many, and why the first.
+    /// Messages that could not be decoded, by topic: how many, and where and why the first.
     pub undecodable: BTreeMap<String, (u64, String)>,
     /// Messages that came after one with a later stamp, by topic; they were put in order.
     pub out_of_order: BTreeMap<String, u64>,
@@ -92,13 +113,33 @@ pub struct LogRecord {
     pub left_out: Vec<String>,
     /// What was assumed, chosen or found.
     pub notes: Vec<String>,
+    /// Of all episodes.
     pub shards: Vec<ShardRecord>,
+    /// How often its clock jumped back and began another episode, by topic.
+    pub clock_jumps: BTreeMap<String, u64>,
+    /// What became of all its messages, by topic.
+    pub topics: Vec<TopicAccount>,
+    /// Over all frames.
+    pub skews: Skews,
+    pub episodes: Vec<EpisodeRecord>,
 }
 
 impl LogRecord {
-    /// Whether anything of the log did not make it into the dataset.
+    /// The shards of each episode in turn.
+    pub fn shards_by_episode(&self) -> impl Iterator<Item = &[ShardRecord]> {
+        let mut rest = self.shards.as_slice();
+        self.episodes.iter().map(move |episode| {
+            let (own, others) = rest.split_at(episode.shards.min(rest.len()));
+            rest = others;
+            own
+        })
+    }
+
+    /// Whether anything of the log did not make it into the dataset, but for what was not needed.
     pub fn has_loss(&self) -> bool {
+        let lacks_stamps = |topic: &TopicAccount| topic.left_out.contains_key(&LeftOut::NoStamp);
         self.drops.total() > 0
+            || self.topics.iter().any(lacks_stamps)
             || !self.damage.is_empty()
             || !self.undecodable.is_empty()
             || !self.left_out.is_empty()
@@ -180,60 +221,4 @@ impl Manifest {
         }
         crate::atomic::hex(&hasher.finalize())[..16].to_string()
     }
-}
-
-/// Write `episodes.parquet`: one row an episode.
-///
-/// # Errors
-///
-/// If the disk refuses.
-pub fn write_episodes(path: &Path, logs: &[LogRecord]) -> Result<()> {
-    let text = |pick: &dyn Fn(&LogRecord) -> Option<String>| -> ArrayRef {
-        Arc::new(logs.iter().map(pick).collect::<StringArray>())
-    };
-    let float = |pick: fn(&LogRecord) -> f64| -> ArrayRef {
-        Arc::new(logs.iter().map(pick).map(Some).collect::<Float64Array>())
-    };
-    let mut columns: Vec<(String, ArrayRef)> = vec![
-        ("id".into(), text(&|log| Some(log.episode.clone()))),
-        ("source_log".into(), text(&|log| Some(log.source_log.clone()))),
-        ("split".into(), text(&|log| Some(log.split.name().to_string()))),
-        ("town".into(), text(&|log| log.conditions.town.clone())),
-        ("weather".into(), text(&|log| log.conditions.weather.clone())),
-        ("illumination".into(), text(&|log| log.conditions.illumination.clone())),
-        ("traffic".into(), text(&|log| log.conditions.traffic.clone())),
-        (
-            "frames".into(),
-            Arc::new(logs.iter().map(|log| Some(log.frames as u32)).collect::<UInt32Array>()),
-        ),
-        ("duration_s".into(), float(|log| log.duration_s)),
-        ("distance_m".into(), float(|log| log.distance_m)),
-    ];
-    for reason in Reason::ALL {
-        let counts = logs.iter().map(|log| Some(log.drops.count(reason)));
-        columns.push((
-            format!("dropped_{}", reason.name()),
-            Arc::new(counts.collect::<UInt64Array>()),
-        ));
-    }
-    let nullable = ["town", "weather", "illumination", "traffic"];
-    let fields: Vec<Field> = columns
-        .iter()
-        .map(|(name, column)| {
-            let data_type: DataType = column.data_type().clone();
-            Field::new(name, data_type, nullable.contains(&name.as_str()))
-        })
-        .collect();
-    let schema = Arc::new(Schema::new(fields));
-    let columns = columns.into_iter().map(|(_, column)| column).collect();
-    let batch = RecordBatch::try_new(schema.clone(), columns).map_err(Error::arrow(path))?;
-    let properties = WriterProperties::builder()
-        .set_created_by(concat!("pmp ", env!("CARGO_PKG_VERSION")).to_string())
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .build();
-    let mut writer = ArrowWriter::try_new(AtomicFile::create(path)?, schema, Some(properties))
-        .map_err(Error::parquet(path))?;
-    writer.write(&batch).map_err(Error::parquet(path))?;
-    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
-    Ok(())
 }

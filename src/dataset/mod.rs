@@ -3,7 +3,8 @@
 //! ```text
 //! samples -> ego (pose, velocity) -> future, route, control   labels
 //!         -> align (grid) -> drive (frames: picture, ralidar) -> columns -> shard
-//! ingest: one log after the other, each committed alone; split, manifest, summary, inspect
+//! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
+//! ingest: one log after the other, each committed alone; split, manifest, episodes, summary, inspect
 //! open (which frames train, which judge) -> order -> sample -> batch, by loader
 //! ```
 
@@ -15,12 +16,19 @@ pub mod control;
 pub mod ralidar;
 pub mod picture;
 pub mod align;
+pub mod clocks;
 pub mod drive;
 pub mod columns;
 pub mod shard;
 pub mod split;
+pub mod account;
+pub mod skew;
 pub mod manifest;
+pub mod episodes;
 pub mod summary;
+pub mod episode;
+pub mod record;
+pub mod claim;
 pub mod compaction;
 pub mod ingest;
 pub mod inspect;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{
     dataset::{
         manifest::{LogRecord, Manifest},
-        shard::{RowTick, ShardReader},
+        shard::{RowTick, ShardReader, ShardRecord},
         split::Split,
     },
     error::Result,
@@ -80,9 +80,9 @@ pub struct Dataset {
 impl Dataset {
     /// Open a dataset and set apart the frames that judge.
     ///
-    /// Episodes are on the side that their record says. Where that leaves a side empty, the
-    /// episode with the smallest id judges; a lone episode is cut in time: its last third judges,
-    /// and the 3 s before it belong to neither side.
+    /// Episodes are on the side that their record says. Where that leaves a side empty, the log
+    /// whose episodes have the smallest ids judges; those of a lone log are cut in time: the last
+    /// third judges, and the 3 s before it belong to neither side.
     ///
     /// # Errors
     ///
@@ -117,8 +117,10 @@ impl Dataset {
                     false if index == 0 => Split::Val,
                     false => Split::Train,
                 };
-                dataset.add(log, |_| Some(side))?;
-                dataset.part(side).episodes += 1;
+                for shards in log.shards_by_episode() {
+                    dataset.add(shards, |_| Some(side))?;
+                }
+                dataset.part(side).episodes += log.episodes.len();
             }
         }
         Ok(dataset)
@@ -172,28 +174,34 @@ impl Dataset {
             ),
             is_time_block: true,
         };
-        let mut last_tick = 0;
-        for record in &log.shards {
-            let reader = ShardReader::open(&self.path, record)?;
-            let last = reader.ticks()?.into_iter().flatten().map(|tick| tick.index).max();
-            last_tick = last_tick.max(last.unwrap_or(0));
+        for shards in log.shards_by_episode() {
+            let mut last_tick = 0;
+            for record in shards {
+                let reader = ShardReader::open(&self.path, record)?;
+                let last = reader.ticks()?.into_iter().flatten().map(|tick| tick.index).max();
+                last_tick = last_tick.max(last.unwrap_or(0));
+            }
+            let first_val = last_tick + 1 - (last_tick + 1) / TIME_BLOCK_ONE_IN;
+            self.add(shards, |tick| match tick {
+                tick if tick >= first_val => Some(Split::Val),
+                tick if tick + GUARD_TICKS < first_val => Some(Split::Train),
+                _ => None,
+            })?;
         }
-        let first_val = last_tick + 1 - (last_tick + 1) / TIME_BLOCK_ONE_IN;
-        self.add(log, |tick| match tick {
-            tick if tick >= first_val => Some(Split::Val),
-            tick if tick + GUARD_TICKS < first_val => Some(Split::Train),
-            _ => None,
-        })?;
-        self.train.episodes = 1;
-        self.val.episodes = 1;
+        self.train.episodes = log.episodes.len();
+        self.val.episodes = log.episodes.len();
         Ok(())
     }
 
     /// Open an episode's shards and deal their rows out by tick.
-    fn add(&mut self, log: &LogRecord, side_of: impl Fn(u32) -> Option<Split>) -> Result<()> {
+    fn add(
+        &mut self,
+        shards: &[ShardRecord],
+        side_of: impl Fn(u32) -> Option<Split>,
+    ) -> Result<()> {
         let mut ticks: Vec<Vec<Vec<RowTick>>> = Vec::new();
         let first_shard = self.shards.len();
-        for record in &log.shards {
+        for record in shards {
             let reader = ShardReader::open(&self.path, record)?;
             ticks.push(reader.ticks()?);
             self.shards.push(reader);

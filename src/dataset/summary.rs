@@ -2,7 +2,10 @@
 
 use std::fmt::{self, Display, Write as _};
 
-use crate::dataset::manifest::{LogRecord, Manifest};
+use crate::dataset::{
+    account::TopicAccount,
+    manifest::{LogRecord, Manifest},
+};
 
 /// Damages of one log that are listed; the manifest has them all.
 const LISTED: usize = 5;
@@ -32,7 +35,7 @@ impl Display for Report<'_> {
         write!(
             f,
             "{}, {} frames, {hours:.2} h",
-            plural(self.0.logs.len(), "episode"),
+            plural(self.0.logs.iter().map(|log| log.episodes.len()).sum(), "episode"),
             self.0.frames
         )?;
         match self.0.failed.len() {
@@ -74,6 +77,27 @@ fn write_log(f: &mut fmt::Formatter, log: &LogRecord) -> fmt::Result {
     for (topic, count) in &log.out_of_order {
         writeln!(f, "  {topic}: {count} messages came late and were put in order")?;
     }
+    for (topic, count) in &log.clock_jumps {
+        writeln!(f, "  {topic}: its clock jumped back {count} times, each begins an episode")?;
+    }
+    for account in log.topics.iter().filter(|account| account.used_as.is_some()) {
+        write_account(f, account)?;
+    }
+    let unused = log.topics.iter().filter(|account| account.used_as.is_none());
+    let (topics, messages) = unused.fold((0, 0), |(n, sum), topic| (n + 1, sum + topic.read));
+    if topics > 0 {
+        writeln!(f, "  {messages} messages of {topics} topics that frames take nothing from")?;
+    }
+    let skews: Vec<_> = log.skews.iter().collect();
+    if !skews.is_empty() {
+        write!(f, "  ms from tick to sample (median, 95 %, largest):")?;
+        for (index, (sensor, skew)) in skews.into_iter().enumerate() {
+            let comma = if index == 0 { "" } else { "," };
+            let (median, p95, largest) = (skew.median_ms, skew.p95_ms, skew.largest_ms);
+            write!(f, "{comma} {sensor} {median:.1} {p95:.1} {largest:.1}")?;
+        }
+        writeln!(f)?;
+    }
     for left_out in &log.left_out {
         writeln!(f, "  left out: {left_out}")?;
     }
@@ -81,4 +105,15 @@ fn write_log(f: &mut fmt::Formatter, log: &LogRecord) -> fmt::Result {
         writeln!(f, "  note: {note}")?;
     }
     Ok(())
+}
+
+/// One line for a topic of which not everything was used.
+fn write_account(f: &mut fmt::Formatter, account: &TopicAccount) -> fmt::Result {
+    if account.left_out.is_empty() {
+        return Ok(());
+    }
+    let reasons = account.left_out.iter();
+    let reasons: Vec<_> = reasons.map(|(why, count)| format!("{count} {}", why.name())).collect();
+    let (topic, used, read) = (&account.topic, account.used, account.read);
+    writeln!(f, "  {topic}: {used} of {read} messages used; not: {}", reasons.join(", "))
 }

@@ -1,8 +1,9 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
+//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples) -> scan (recordings)
 //!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
+//!           clock: which instant, jumps: where it goes back
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
@@ -17,6 +18,7 @@ pub const CONDITIONS_RECORD: &str = "pmp.conditions";
 /// always those that the driver wanted because steering was disturbed on purpose.
 pub const APPLIED_CONTROL: &str = "applied_control";
 
+pub mod clock;
 pub mod chunk;
 pub mod hashed;
 pub mod reader;
@@ -34,7 +36,9 @@ pub mod signals;
 pub mod cloud;
 pub mod decoder;
 pub mod transforms;
+pub mod jumps;
 pub mod recording;
+pub mod scan;
 pub mod profile;
 pub mod mapping;
 pub mod definitions;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     error::{Error, Result},
     frame::{Conditions, IMAGE_HEIGHT, IMAGE_WIDTH},
+    log::clock::ClockRule,
     projection::Crop,
 };
 
@@ -25,6 +26,7 @@ pub const DEFAULT_STEERING_LOCK_RAD: f64 = 0.611;
 #[serde(deny_unknown_fields, default)]
 pub struct Profile {
     pub topics: Topics,
+    pub clock: ClockRule,
     pub tolerance_ms: Tolerance,
     pub camera: CameraRule,
     pub control: ControlRule,
@@ -142,7 +144,13 @@ impl Profile {
         Ok(profile)
     }
 
-    fn check(&self) -> Result<()> {
+    /// Make sure that all values are within their ranges.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] names the value that is not.
+    pub fn check(&self) -> Result<()> {
+        self.clock.check()?;
         let fail =
             |key: &str, what: String| Err(Error::Config { key: key.to_string(), what, hint: None });
         let t = &self.tolerance_ms;

@@ -20,6 +20,7 @@ use crate::{
     error::{Error, Result},
     log::{
         chunk::{Decompressor, RECORD_HEADER_BYTES, Records, chunk_header, le_u64},
+        clock::instant_ns,
         hashed::HashedFile,
     },
 };
@@ -30,6 +31,15 @@ pub const MAX_RECORD_BYTES: u64 = 512 << 20;
 
 /// Messages outside chunks are fetched in pieces of this size.
 const PLAIN_SEGMENT_BYTES: u64 = 4 << 20;
+
+/// What is given by mistake: first bytes, name, what to do.
+const FOREIGN: [(&[u8], &str, &str); 5] = [
+    (b"#ROSBAG", "a ROS 1 bag", "convert it with `mcap convert in.bag out.mcap`"),
+    (b"SQLite", "an SQLite database (rosbag2)", "convert it with `mcap convert in.db3 out.mcap`"),
+    (b"\x1f\x8b", "a gzip file", "unpack it with `gunzip`"),
+    (b"PK", "a zip archive", "unpack it with `unzip`"),
+    (b"\x28\xb5\x2f\xfd", "a zstd file", "unpack it with `unzstd`"),
+];
 
 const MESSAGE_HEADER_BYTES: usize = 22;
 
@@ -69,6 +79,8 @@ pub struct Message<'a> {
     pub channel: &'a Arc<Channel>,
     /// When it was recorded, ns since the Unix epoch.
     pub log_time_ns: i64,
+    /// When it was sent, ns since the Unix epoch.
+    pub publish_time_ns: i64,
     pub data: &'a [u8],
     pub place: Place,
 }
@@ -138,6 +150,19 @@ impl Log {
         self.counts.values().sum()
     }
 
+    /// Whether there is a channel of this topic, with or without messages.
+    pub fn has_topic(&self, topic: &str) -> bool {
+        self.channels.values().any(|channel| channel.topic == topic)
+    }
+
+    /// Where in the file a message lies, or the chunk that holds it.
+    pub fn offset_of(&self, place: Place) -> u64 {
+        match &self.segments[place.segment as usize] {
+            Segment::Chunk { data_offset, .. } => *data_offset,
+            Segment::Plain { offset, .. } => offset + u64::from(place.start),
+        }
+    }
+
     fn read_at(&self, offset: u64, len: u64) -> Result<Vec<u8>> {
         let mut bytes = vec![0; len as usize];
         self.file.read_exact_at(&mut bytes, offset).map_err(Error::io("read", &self.path))?;
@@ -153,12 +178,15 @@ impl Log {
             return fail("the file is empty", "was the recorder stopped before it wrote anything?");
         }
         let head = self.read_at(0, self.size_bytes.min(mcap::MAGIC.len() as u64))?;
-        match head == mcap::MAGIC {
-            true => Ok(()),
-            false => fail(
-                "this is not an MCAP file: its first bytes are not the MCAP magic",
-                "rosbag2 .db3 and ROS 1 .bag files can be converted with `mcap convert`",
-            ),
+        if head == mcap::MAGIC {
+            return Ok(());
+        }
+        let what = "this is not an MCAP file: its first bytes are not the MCAP magic";
+        match FOREIGN.iter().find(|(magic, ..)| head.starts_with(magic)) {
+            Some((_, name, hint)) => fail(&format!("{what} but those of {name}"), hint),
+            None => {
+                fail(what, "rosbag2 .db3 and ROS 1 .bag files can be converted with `mcap convert`")
+            }
         }
     }
 
@@ -377,8 +405,13 @@ impl Walk<'_> {
                     start: place.1 + MESSAGE_HEADER_BYTES as u32,
                     len: data.len() as u32,
                 };
-                let log_time_ns = header.log_time as i64;
-                (self.on_message)(&Message { channel, log_time_ns, data: &data, place })?;
+                (self.on_message)(&Message {
+                    channel,
+                    log_time_ns: instant_ns(header.log_time),
+                    publish_time_ns: instant_ns(header.publish_time),
+                    data: &data,
+                    place,
+                })?;
             }
             Ok(Record::Metadata(metadata)) => {
                 log.metadata.entry(metadata.name).or_insert(metadata.metadata);

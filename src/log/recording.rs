@@ -1,18 +1,20 @@
-//! One pass over a log: small signals decoded, pictures and clouds located.
+//! What one pass over a log tells: small signals decoded, pictures and clouds located.
 //!
 //! What is small (poses, speeds, controls, calibration) is kept whole, per topic. Of what is
 //! large only the time and the place in the file are kept, so memory does not grow with the
 //! pictures, and the second pass decodes those that frames need and no others.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc};
 
 use glam::DVec3;
 
 use crate::{
     error::{Error, Result},
     log::{
+        clock::{Clock, ClockRule, moved_ns},
         cloud::Cloud,
         decoder::Decoder,
+        jumps::{Course, JUMP_NS},
         reader::{Channel, Log, Message, Place},
         signals::{self, CarlaStatus, Control, Header, Kind, Odometry, Pose},
         transforms::TransformTree,
@@ -46,7 +48,7 @@ pub enum Series {
 }
 
 /// A topic that pmp can use.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Topic {
     pub name: String,
     pub kind: Kind,
@@ -59,12 +61,28 @@ pub struct Topic {
     pub child_frame_id: Option<String>,
     /// Fields of the first cloud.
     pub cloud_fields: Vec<String>,
-    /// Header stamps are all zero, so log times stand in for them.
+    /// Which instant of a message stamps its sample.
+    pub clock: Clock,
+    /// Header stamps are asked for and all zero, so log times stand in for them.
     pub uses_log_time: bool,
+    /// Messages, of whatever became of them.
+    pub messages: u64,
     /// Messages that could not be decoded, and why the first could not.
     pub undecodable: (u64, Option<String>),
+    pub first_undecodable: Option<Place>,
     /// Messages that came after one with a later stamp.
     pub out_of_order: u64,
+    /// Messages whose stamp another one had already.
+    pub repeated: u64,
+    /// Messages whose header stamp is zero, while those of others are not.
+    pub unstamped: u64,
+    /// The shortest time from stamp, without offset, to log time.
+    least_delay_ns: i64,
+    /// Added to every stamp.
+    offset_ns: i64,
+    pub(super) course: Course,
+    /// Marks that there were when the last calibration was kept.
+    marks_seen: usize,
 }
 
 /// A topic that pmp does not use.
@@ -73,101 +91,68 @@ pub struct Unused {
     pub topic: String,
     pub type_name: String,
     pub why: String,
+    /// What it could be, if it could be decoded.
+    pub kind: Option<Kind>,
+    pub messages: u64,
 }
 
-/// All that one pass over a log tells.
+/// All that one pass over a log tells of a drive; a log has several where its clocks jump back.
 #[derive(Debug)]
 pub struct Recording {
-    pub log: Log,
+    pub log: Arc<Log>,
     /// By name.
     pub topics: BTreeMap<String, Topic>,
     pub unused: Vec<Unused>,
     pub transforms: TransformTree,
+    /// Topics whose clock jumped back where this recording begins.
+    pub jumped: Vec<String>,
 }
 
 impl Recording {
-    /// Scan a log; `on_bytes` hears of progress.
-    ///
-    /// # Errors
-    ///
-    /// As [`Log::scan`]. A message that cannot be decoded is counted in its topic, not an error.
-    pub fn scan(path: &Path) -> Result<Recording> {
-        let mut builder = Builder::default();
-        let log = Log::scan(path, &mut |message| {
-            builder.add(message);
-            Ok(())
-        })?;
-        Ok(builder.finish(log))
-    }
-}
-
-/// What a channel turned out to be at its first message.
-enum Entry {
-    /// Name of the topic in [`Builder::topics`].
-    Used(String),
-    Unused,
-}
-
-#[derive(Default)]
-struct Builder {
-    channels: BTreeMap<u16, Entry>,
-    topics: BTreeMap<String, Topic>,
-    unused: Vec<Unused>,
-    transforms: TransformTree,
-}
-
-impl Builder {
-    fn add(&mut self, message: &Message) {
-        let id = message.channel.id;
-        if !self.channels.contains_key(&id) {
-            let entry = self.open(message.channel);
-            self.channels.insert(id, entry);
-        }
-        let Some(Entry::Used(name)) = self.channels.get(&id) else { return };
-        let Some(topic) = self.topics.get_mut(name) else { return };
-        if let Err(error) = topic.add(message, &mut self.transforms) {
-            topic.undecodable.0 += 1;
-            topic.undecodable.1.get_or_insert_with(|| error.to_string());
-        }
+    /// Messages of all topics.
+    pub fn message_count(&self) -> u64 {
+        let used = self.topics.values().map(|topic| topic.messages);
+        used.chain(self.unused.iter().map(|unused| unused.messages)).sum()
     }
 
-    fn open(&mut self, channel: &Arc<Channel>) -> Entry {
-        match usable(channel) {
-            Ok((kind, decoder)) => {
-                self.topics
-                    .entry(channel.topic.clone())
-                    .or_insert_with(|| Topic::new(kind, channel.clone(), Arc::new(decoder)));
-                Entry::Used(channel.topic.clone())
-            }
-            Err(why) => {
-                let type_name = channel.schema.as_ref().map(|schema| schema.name.clone());
-                let (topic, type_name) = (channel.topic.clone(), type_name.unwrap_or_default());
-                self.unused.push(Unused { topic, type_name, why });
-                Entry::Unused
+    /// Take over what was told before and holds on: the calibration of a camera.
+    pub(super) fn inherit(&mut self, earlier: &Recording) {
+        for (name, topic) in &mut self.topics {
+            if let Series::CameraInfo(samples) = &mut topic.series
+                && samples.is_empty()
+                && let Some(Series::CameraInfo(before)) =
+                    earlier.topics.get(name).map(|t| &t.series)
+            {
+                samples.extend(before.last().cloned());
             }
         }
     }
 
-    fn finish(mut self, log: Log) -> Recording {
+    /// Put all samples in order.
+    pub(super) fn settle(&mut self) {
         self.transforms.finish();
-        for topic in self.topics.values_mut() {
-            topic.series.sort();
-        }
+        self.topics.values_mut().for_each(Topic::settle);
         self.unused.sort_by(|a, b| a.topic.cmp(&b.topic));
-        let Builder { topics, unused, transforms, .. } = self;
-        Recording { log, topics, unused, transforms }
     }
 }
 
-/// Whether and as what a channel can be read.
-fn usable(channel: &Channel) -> Result<(Kind, Decoder), String> {
-    let record = channel.schema.as_ref().ok_or("the log has no definition for it")?;
-    let kind = Kind::of(&record.name).ok_or("a type that frames do not need")?;
-    Ok((kind, Decoder::of(channel)?))
+/// How far a topic had come when a clock stepped back.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TopicMark {
+    samples: usize,
+    messages: u64,
+    undecodable: u64,
+    pub(super) last_ns: Option<i64>,
 }
 
 impl Topic {
-    fn new(kind: Kind, channel: Arc<Channel>, decoder: Arc<Decoder>) -> Topic {
+    /// A topic without messages yet.
+    pub fn new(
+        kind: Kind,
+        channel: Arc<Channel>,
+        decoder: Arc<Decoder>,
+        clock: &ClockRule,
+    ) -> Topic {
         let series = match kind {
             Kind::CompressedImage | Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
             Kind::RadarScan | Kind::RadarTracks => Series::Located(Vec::new()),
@@ -182,18 +167,28 @@ impl Topic {
             // Transforms go to the tree; the series stays empty.
             Kind::Transforms => Series::Located(Vec::new()),
         };
+        let clock_of_topic = clock.of(&channel.topic);
         Topic {
             name: channel.topic.clone(),
             kind,
+            clock: clock_of_topic,
+            offset_ns: clock.offset_ns(&channel.topic),
             channel,
             decoder,
             series,
             frame_id: String::new(),
             child_frame_id: None,
             cloud_fields: Vec::new(),
-            uses_log_time: false,
+            uses_log_time: clock_of_topic == Clock::Header,
+            messages: 0,
             undecodable: (0, None),
+            first_undecodable: None,
             out_of_order: 0,
+            repeated: 0,
+            unstamped: 0,
+            least_delay_ns: i64::MAX,
+            course: Course::default(),
+            marks_seen: 0,
         }
     }
 
@@ -206,31 +201,56 @@ impl Topic {
         self.decoder.decode(data)
     }
 
-    fn add(&mut self, message: &Message, transforms: &mut TransformTree) -> Result<()> {
+    /// The shortest time from stamp to log time; `None` where messages have no stamp of their own.
+    pub fn delay_ns(&self) -> Option<i64> {
+        let has_stamps = self.clock == Clock::Header && self.least_delay_ns != i64::MAX;
+        has_stamps.then(|| moved_ns(self.least_delay_ns, -self.offset_ns))
+    }
+
+    /// The instant of a message. As long as all header stamps are zero, log times stand in.
+    pub(super) fn stamp(&mut self, header: &Header, message: &Message) -> i64 {
+        if self.uses_log_time && header.stamp_ns != 0 {
+            // So there is a clock, and the zeros before were its beginning, or not yet set.
+            self.uses_log_time = false;
+            self.series.restamp(moved_ns(0, self.offset_ns));
+            self.course = Course::default();
+        }
+        if self.clock == Clock::Header && !self.uses_log_time {
+            let delay_ns = moved_ns(message.log_time_ns, -moved_ns(header.stamp_ns, 0));
+            self.least_delay_ns = self.least_delay_ns.min(delay_ns);
+        }
+        let stamp_ns = match self.clock {
+            Clock::Header if self.uses_log_time => message.log_time_ns,
+            Clock::Header => header.stamp_ns,
+            Clock::Log => message.log_time_ns,
+            Clock::Publish => message.publish_time_ns,
+        };
+        moved_ns(stamp_ns, self.offset_ns)
+    }
+
+    /// The instant of one transform of a message, which has no header of its own.
+    pub(super) fn stamp_of_link(&mut self, header: &Header, message: &Message) -> i64 {
+        self.uses_log_time &= header.stamp_ns == 0;
+        let stamp_ns = match self.clock {
+            Clock::Header if header.stamp_ns != 0 => header.stamp_ns,
+            Clock::Header | Clock::Log => message.log_time_ns,
+            Clock::Publish => message.publish_time_ns,
+        };
+        moved_ns(stamp_ns, self.offset_ns)
+    }
+
+    pub(super) fn add(&mut self, message: &Message, stamp_ns: i64, marks: usize) -> Result<()> {
         let decoder = self.decoder.clone();
-        if self.kind == Kind::Transforms {
-            let is_static = self.name.ends_with("static");
-            for (header, child, pose) in signals::transforms(&decoder.decode(message.data)?)? {
-                transforms.insert(&header, &child, pose, is_static);
-            }
-            return Ok(());
-        }
-        let header = decoder.header(message.data)?;
-        let is_first = self.series.is_empty();
-        if is_first {
-            self.describe(message, &header)?;
-        }
-        let stamp_ns = if self.uses_log_time { message.log_time_ns } else { header.stamp_ns };
-        if self.series.last_stamp().is_some_and(|last| stamp_ns < last) {
-            self.out_of_order += 1;
-        }
         let decode = || decoder.decode(message.data);
         match &mut self.series {
             Series::Located(samples) => samples.push(Stamped { stamp_ns, value: message.place }),
             Series::CameraInfo(samples) => {
                 let value = signals::camera_info(&decode()?)?;
-                // Calibration is sent with every picture; only its changes are kept.
-                if samples.last().is_none_or(|last| last.value != value) {
+                // Calibration is sent with every picture; only its changes are kept, and the first
+                // of what may be a new episode.
+                let is_new = samples.last().is_none_or(|last| last.value != value);
+                if is_new || self.marks_seen != marks {
+                    self.marks_seen = marks;
                     samples.push(Stamped { stamp_ns, value });
                 }
             }
@@ -265,9 +285,8 @@ impl Topic {
     }
 
     /// Learn from the first message what holds for all of the topic.
-    fn describe(&mut self, message: &Message, header: &Header) -> Result<()> {
+    pub(super) fn describe(&mut self, message: &Message, header: &Header) -> Result<()> {
         self.frame_id = header.frame_id.clone();
-        self.uses_log_time = header.stamp_ns == 0;
         let decoder = self.decoder.clone();
         match self.kind {
             Kind::Odometry => {
@@ -282,6 +301,48 @@ impl Topic {
             _ => {}
         }
         Ok(())
+    }
+
+    pub(super) fn mark(&self) -> TopicMark {
+        TopicMark {
+            samples: self.series.len(),
+            messages: self.messages,
+            undecodable: self.undecodable.0,
+            last_ns: self.course.last_ns(),
+        }
+    }
+
+    /// Cut off what came after a mark.
+    pub(super) fn split_off(&mut self, at: TopicMark) -> Topic {
+        let later = Topic {
+            series: self.series.split_off(at.samples),
+            messages: self.messages - at.messages,
+            undecodable: (self.undecodable.0 - at.undecodable, self.undecodable.1.clone()),
+            ..self.clone()
+        };
+        self.messages = at.messages;
+        self.undecodable.0 = at.undecodable;
+        later
+    }
+
+    /// Put the samples in order, and count those that were not or that have no place in it.
+    pub(super) fn settle(&mut self) {
+        self.out_of_order = self.series.steps_back();
+        let before = self.series.len() as u64;
+        let unset_ns = moved_ns(0, self.offset_ns);
+        let unset = self.series.count_at(unset_ns);
+        self.series.sort();
+        if matches!(self.series, Series::CameraInfo(_)) {
+            return;
+        }
+        self.repeated = before - self.series.len() as u64;
+        let has_own_clock = self.clock == Clock::Header && !self.uses_log_time;
+        // A clock that begins at zero goes on from there; a stamp that nobody set does not.
+        if has_own_clock && self.series.begins_alone_at(unset_ns) {
+            self.series.remove_first();
+            self.unstamped = unset;
+            self.repeated -= unset - 1;
+        }
     }
 }
 
@@ -318,16 +379,67 @@ impl Series {
         })
     }
 
-    fn last_stamp(&self) -> Option<i64> {
-        with_samples!(self, samples => samples.last().map(|sample| sample.stamp_ns))
-    }
-
-    /// Ascending; of samples with the same stamp the first stays.
+    /// Ascending; of samples with the same stamp the first stays, and of calibrations those that
+    /// change something.
     fn sort(&mut self) {
         with_samples!(self, samples => {
             samples.sort_by_key(|sample| sample.stamp_ns);
             samples.dedup_by_key(|sample| sample.stamp_ns);
         });
+        if let Series::CameraInfo(samples) = self {
+            samples.dedup_by(|later, earlier| later.value == earlier.value);
+        }
+    }
+
+    /// Samples with an earlier stamp than the one before.
+    fn steps_back(&self) -> u64 {
+        let steps_back = |pair: (i64, i64)| pair.1 < pair.0;
+        with_samples!(self, samples => {
+            let pairs = samples.windows(2).map(|pair| (pair[0].stamp_ns, pair[1].stamp_ns));
+            pairs.filter(|pair| steps_back(*pair)).count() as u64
+        })
+    }
+
+    /// Samples with this stamp.
+    fn count_at(&self, stamp_ns: i64) -> u64 {
+        with_samples!(self, samples => {
+            samples.iter().filter(|sample| sample.stamp_ns == stamp_ns).count() as u64
+        })
+    }
+
+    /// Whether the first sample is at this instant and none follows soon.
+    fn begins_alone_at(&self, stamp_ns: i64) -> bool {
+        with_samples!(self, samples => match samples.as_slice() {
+            [first, rest @ ..] if first.stamp_ns == stamp_ns => {
+                rest.first().is_none_or(|next| next.stamp_ns - stamp_ns > JUMP_NS)
+            }
+            _ => false,
+        })
+    }
+
+    fn remove_first(&mut self) {
+        with_samples!(self, samples => drop(samples.remove(0)));
+    }
+
+    /// Stamp all samples anew.
+    fn restamp(&mut self, stamp_ns: i64) {
+        with_samples!(self, samples => {
+            samples.iter_mut().for_each(|sample| sample.stamp_ns = stamp_ns);
+        });
+    }
+
+    fn split_off(&mut self, at: usize) -> Series {
+        match self {
+            Series::Located(samples) => Series::Located(samples.split_off(at)),
+            Series::CameraInfo(samples) => Series::CameraInfo(samples.split_off(at)),
+            Series::Odometry(samples) => Series::Odometry(samples.split_off(at)),
+            Series::Pose(samples) => Series::Pose(samples.split_off(at)),
+            Series::Twist(samples) => Series::Twist(samples.split_off(at)),
+            Series::Imu(samples) => Series::Imu(samples.split_off(at)),
+            Series::Control(samples) => Series::Control(samples.split_off(at)),
+            Series::Status(samples) => Series::Status(samples.split_off(at)),
+            Series::Path(samples) => Series::Path(samples.split_off(at)),
+        }
     }
 }
 

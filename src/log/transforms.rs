@@ -85,11 +85,35 @@ impl TransformTree {
         }
     }
 
+    /// How many poses each frame has so far, by child.
+    pub fn lengths(&self) -> BTreeMap<String, usize> {
+        self.links.iter().map(|(child, link)| (child.clone(), link.poses.len())).collect()
+    }
+
+    /// Cut off what was inserted after the tree had these lengths. What is static, or was told
+    /// before and never again, holds in both parts.
+    pub fn split_off(&mut self, at: &BTreeMap<String, usize>) -> TransformTree {
+        let split = |(child, link): (&String, &mut Link)| {
+            let mut later = link.clone();
+            if !link.is_static {
+                later.poses = link.poses.split_off(at.get(child).copied().unwrap_or_default());
+                if later.poses.is_empty() && link.has_one_pose() {
+                    later.poses = link.poses.clone();
+                }
+            }
+            (child.clone(), later)
+        };
+        let mut later = TransformTree { links: self.links.iter_mut().map(split).collect() };
+        later.links.retain(|_, link| !link.poses.is_empty());
+        self.links.retain(|_, link| !link.poses.is_empty());
+        later
+    }
+
     /// Sort by stamp; call once after the last [`insert`](TransformTree::insert).
     pub fn finish(&mut self) {
         for link in self.links.values_mut() {
             link.poses.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-            link.is_fixed = link.poses.windows(2).all(|pair| pair[0].1 == pair[1].1);
+            link.is_fixed = link.has_one_pose();
         }
     }
 
@@ -142,6 +166,10 @@ impl TransformTree {
 }
 
 impl Link {
+    fn has_one_pose(&self) -> bool {
+        self.poses.windows(2).all(|pair| pair[0].1 == pair[1].1)
+    }
+
     fn at(&self, stamp_ns: i64) -> Option<Pose> {
         if self.is_static || self.is_fixed {
             return self.poses.first().map(|(_, pose)| *pose);

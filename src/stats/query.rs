@@ -258,7 +258,7 @@ fn part(
         full_future: of_frames(answers.with_full_future),
     };
     Some(Part {
-        episodes: logs.len() as u64,
+        episodes: logs.iter().map(|log| log.episodes.len() as u64).sum(),
         frames,
         hours: frames as f64 / manifest.config.rate_hz / 3600.0,
         distance_km: logs.iter().map(|log| log.distance_m).sum::<f64>() / 1000.0,

@@ -21,6 +21,7 @@ use pmp::{
     frame::{Command, FUTURE_STEPS, ROUTE_POINTS, Route, RouteSource},
     log::{
         cdr,
+        clock::ClockRule,
         decoder::Decoder,
         profile::{Profile, Required, Tolerance},
         reader::{Channel, Place},
@@ -397,24 +398,15 @@ fn the_command_tells_corners_from_curves() {
 fn controls(kind: Kind, samples: &[Control], profile: &Profile, track: &EgoTrack) -> Controls {
     let stamped = samples.iter().enumerate();
     let stamped = stamped.map(|(i, value)| Stamped { stamp_ns: i as i64, value: *value }).collect();
-    let topic = Topic {
-        name: "/control".into(),
-        kind,
-        channel: Arc::new(Channel {
-            id: 1,
-            topic: "/control".into(),
-            message_encoding: "cdr".into(),
-            schema: None,
-        }),
-        decoder: Arc::new(Decoder::Cdr(Schema { types: Vec::new() })),
-        series: Series::Control(stamped),
-        frame_id: String::new(),
-        child_frame_id: None,
-        cloud_fields: Vec::new(),
-        uses_log_time: false,
-        undecodable: (0, None),
-        out_of_order: 0,
-    };
+    let channel = Arc::new(Channel {
+        id: 1,
+        topic: "/control".into(),
+        message_encoding: "cdr".into(),
+        schema: None,
+    });
+    let decoder = Arc::new(Decoder::Cdr(Schema { types: Vec::new() }));
+    let mut topic = Topic::new(kind, channel, decoder, &ClockRule::default());
+    topic.series = Series::Control(stamped);
     Controls::new(Some(&topic), None, profile, track)
 }
 

@@ -8,6 +8,7 @@ use pmp::{
     dataset::drive::Drive,
     frame::{Frame, RouteSource},
     log::{
+        clock::ClockRule,
         cloud::Cloud,
         decoder::Decoder,
         profile::Profile,
@@ -356,7 +357,7 @@ fn what_cannot_be_used_is_told_with_its_reason() {
     add("/f", Some(("foxglove.RawImage", "flatbuffer", b"")), "flatbuffer");
     writer.finish().unwrap();
     let path = written(folder.path(), "log.mcap", &writer.into_inner().into_inner());
-    let recording = Recording::scan(&path).unwrap();
+    let recording = Recording::scan(&path, &ClockRule::default()).unwrap().remove(0);
     let why: Vec<_> = recording.unused.iter().map(|unused| unused.why.as_str()).collect();
     assert_eq!(why[0], "the log has no definition for it");
     assert_eq!(why[1], "a type that frames do not need");
@@ -382,7 +383,7 @@ fn json_pictures_without_a_schema_are_tried_as_base64() {
     writer.write_to_known_channel(&header, text.as_bytes()).unwrap();
     writer.finish().unwrap();
     let path = written(folder.path(), "log.mcap", &writer.into_inner().into_inner());
-    let recording = Recording::scan(&path).unwrap();
+    let recording = Recording::scan(&path, &ClockRule::default()).unwrap().remove(0);
     let topic = &recording.topics["/camera"];
     let Series::Located(samples) = &topic.series else { panic!("{:?}", topic.series) };
     assert_eq!(samples[0].stamp_ns, 7_000_000_005);

@@ -23,7 +23,7 @@ use pmp::{
 
 use crate::fixtures::{DriveLog, Layout, mcap_bytes};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_pmp-ingest");
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_pmp-ingest");
 
 /// What a run said and how it ended.
 pub(crate) struct Said {
@@ -97,7 +97,7 @@ fn short() -> DriveLog {
 }
 
 /// Three logs of different drives in a folder, and the folder for what comes of them.
-fn three_logs(seconds: f64) -> (tempfile::TempDir, Vec<PathBuf>) {
+pub(crate) fn three_logs(seconds: f64) -> (tempfile::TempDir, Vec<PathBuf>) {
     let folder = tempfile::tempdir().unwrap();
     let logs = (0..3)
         .map(|i| {
@@ -281,7 +281,7 @@ fn a_killed_run_given_again_ends_with_the_bytes_of_an_uninterrupted_one() {
 }
 
 /// Names of the files below a folder that may change while it is read.
-fn names(folder: &Path) -> Vec<String> {
+pub(crate) fn names(folder: &Path) -> Vec<String> {
     fn walk(folder: &Path, root: &Path, found: &mut Vec<String>) {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             let path = entry.path();

@@ -20,6 +20,9 @@ mod ingest;
 mod compaction;
 mod memory;
 mod writers;
+mod clocks;
+mod accounts;
+mod shares;
 mod real_drive;
 #[cfg(feature = "learning")]
 mod evaluation;

@@ -11,15 +11,19 @@ use arrow::datatypes::{DataType, TimeUnit};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use pmp::{
     dataset::{
+        account::{LeftOut, TopicAccount},
         columns::{self, SCHEMA_VERSION, VERSION_KEY},
         drive::Calibration,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
+        episodes::write_episodes,
+        manifest::{EpisodeRecord, FailedLog, IngestConfig, LogRecord, Manifest},
         shard::ShardRecord,
+        skew::{SensorSkew, Skews},
         split::Split,
     },
     drops::{Drops, Reason},
     frame::Conditions,
     log::{
+        clock::Clock,
         mapping::{Mapping, PoseSource},
         profile::{Profile, Topics},
         reader::Damage,
@@ -47,6 +51,14 @@ fn type_text(data_type: &DataType) -> String {
         DataType::Float32 => "f32".into(),
         DataType::Float64 => "f64".into(),
         DataType::Timestamp(TimeUnit::Nanosecond, Some(zone)) => format!("timestamp[ns, {zone}]"),
+        DataType::Struct(fields) => {
+            let mark = |is_nullable| if is_nullable { "?" } else { "" };
+            let field = |field: &std::sync::Arc<arrow::datatypes::Field>| {
+                let name = type_text(field.data_type());
+                format!("{}: {name}{}", field.name(), mark(field.is_nullable()))
+            };
+            format!("struct<{}>", fields.iter().map(field).collect::<Vec<_>>().join(", "))
+        }
         DataType::List(item) => {
             assert!(!item.is_nullable(), "items of lists are never null");
             format!("list<{}>", type_text(item.data_type()))
@@ -100,6 +112,8 @@ fn manifest() -> Manifest {
         route: text("/route"),
         ignore: vec!["/other".into()],
     };
+    profile.clock.topics = BTreeMap::from([("/camera".into(), Clock::Log)]);
+    profile.clock.offset_s = BTreeMap::from([("/gps".into(), -66.14)]);
     profile.camera.crop = Some(Crop { x: 1, y: 2, width: 3, height: 4 });
     profile.control.steering_lock_rad = Some(0.6);
     let mut drops = Drops::default();
@@ -119,6 +133,16 @@ fn manifest() -> Manifest {
     };
     let mut camera = Camera::from_fov(600, 250, 1.5);
     camera.distortion = Distortion::PlumbBob([0.1, 0.2, 0.3, 0.4, 0.5]);
+    let calibration = Calibration { camera: Some(camera) };
+    let account = TopicAccount {
+        topic: "/camera".into(),
+        type_name: "sensor_msgs/msg/Image".into(),
+        used_as: text("camera"),
+        read: 3,
+        used: 2,
+        left_out: BTreeMap::from([(LeftOut::NotNearest, 1)]),
+    };
+    let skew = SensorSkew { frames: 3, median_ms: 1.5, p95_ms: 2.5, largest_ms: 3.5 };
     let log = LogRecord {
         episode: "ep-1".into(),
         split: Split::Train,
@@ -128,13 +152,13 @@ fn manifest() -> Manifest {
         messages: 2,
         conditions,
         mapping: mapping.clone(),
-        calibration: Calibration { camera: Some(camera) },
+        calibration: calibration.clone(),
         frames: 3,
         frames_with_full_future: 4,
         start_ns: 5,
         duration_s: 6.5,
         distance_m: 7.5,
-        drops,
+        drops: drops.clone(),
         damage: vec![Damage { offset: 8, what: "damage".into() }],
         undecodable: BTreeMap::from([("/odom".into(), (9, "why".into()))]),
         out_of_order: BTreeMap::from([("/odom".into(), 10)]),
@@ -146,6 +170,27 @@ fn manifest() -> Manifest {
             bytes: 11,
             sha256: "00".into(),
             groups: Some([0, 1]),
+        }],
+        clock_jumps: BTreeMap::from([("/camera".into(), 1)]),
+        topics: vec![account.clone()],
+        skews: Skews {
+            image: Some(skew),
+            lidar: Some(skew),
+            radar: Some(skew),
+            control: Some(skew),
+        },
+        episodes: vec![EpisodeRecord {
+            id: "ep-1".into(),
+            frames: 3,
+            frames_with_full_future: 4,
+            start_ns: 5,
+            duration_s: 6.5,
+            distance_m: 7.5,
+            drops,
+            mapping: mapping.clone(),
+            calibration,
+            topics: vec![account],
+            shards: 1,
         }],
     };
     let transform = PoseSource::Transform("base_link".into());

@@ -11,9 +11,11 @@ use std::{
 use pmp::{
     dataset::{
         drive::Calibration,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest, write_episodes},
+        episodes::write_episodes,
+        manifest::{EpisodeRecord, FailedLog, IngestConfig, LogRecord, Manifest},
         shard::ShardRecord,
         shard::ShardWriter,
+        skew::Skews,
         split::Split,
     },
     drops::{Drops, Reason},
@@ -94,6 +96,22 @@ fn write(root: &Path, drives: &[Drive], change: impl Fn(&mut Vec<LogRecord>)) ->
                 bytes,
                 sha256: format!("{number}"),
                 groups: None,
+            }],
+            clock_jumps: BTreeMap::new(),
+            topics: Vec::new(),
+            skews: Skews::default(),
+            episodes: vec![EpisodeRecord {
+                id: format!("ep-{number}"),
+                frames: rows,
+                frames_with_full_future: 0,
+                start_ns: 0,
+                duration_s: 0.0,
+                distance_m: drive.distance_m,
+                drops: Drops::default(),
+                mapping: Mapping::default(),
+                calibration: Calibration { camera: None },
+                topics: Vec::new(),
+                shards: 1,
             }],
         }
     };
