@@ -11,7 +11,7 @@ use pmp::{
     },
     error::Result,
     frame::GRID_HZ,
-    log::profile::Profile,
+    log::{profile::Profile, rigs::Rig},
 };
 
 /// Turn MCAP driving logs into a sharded Parquet dataset
@@ -39,9 +39,11 @@ enum Inspect {
     Inspect {
         /// MCAP file
         log: PathBuf,
-        /// `auto`, `carla-ros-bridge`, or a FILE.toml
-        #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
+        #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
         profile: String,
+        /// Name the topic of a signal, as camera=/front/image; may be given again
+        #[arg(long = "topic", value_name = "SIGNAL=NAME")]
+        topics: Vec<String>,
         /// Print JSON
         #[arg(long)]
         json: bool,
@@ -58,9 +60,12 @@ struct Ingest {
     #[arg(short, long, value_name = "DATASET")]
     out: PathBuf,
 
-    /// How to read the logs: `auto`, `carla-ros-bridge`, or a FILE.toml
-    #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
+    #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
     profile: String,
+
+    /// Name the topic of a signal, as camera=/front/image; may be given again
+    #[arg(long = "topic", value_name = "SIGNAL=NAME")]
+    topics: Vec<String>,
 
     /// Ticks a second
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
@@ -71,10 +76,28 @@ struct Ingest {
     jobs: Option<usize>,
 }
 
+fn profile(name_or_path: &str, topics: &[String]) -> Result<Profile> {
+    let mut profile = Profile::load(name_or_path)?;
+    for topic in topics {
+        profile.topics.set(topic)?;
+    }
+    Ok(profile)
+}
+
+fn profile_help() -> String {
+    let names: Vec<_> = Rig::names().collect();
+    format!(
+        "How to read the logs: `auto` recognises the rig; a name of one forces it ({}); or a \
+         FILE.toml of your own",
+        names.join(", ")
+    )
+}
+
 const EXAMPLES: &str = "\
 Examples:
   pmp-ingest --out data drives/              all logs below a folder
   pmp-ingest --out data a.mcap b.mcap --profile my-car.toml
+  pmp-ingest --out data a.mcap --topic camera=/front_left/image
   pmp-ingest inspect a.mcap                  what is in a log, and what would be used
 
 Exit codes: 0 everything was used; 3 something was left out, the report says what; 1 failed; 2 misused";
@@ -82,10 +105,10 @@ Exit codes: 0 everything was used; 3 something was left out, the report says wha
 fn main() -> ExitCode {
     let cli = Cli::parse();
     cli::main(|| match (cli.command, cli.ingest) {
-        (Some(Inspect::Inspect { log, profile, json }), _) => {
-            let report = inspect::inspect(&log, &Profile::load(&profile)?)?;
+        (Some(Inspect::Inspect { log, profile: name, topics, json }), _) => {
+            let report = inspect::inspect(&log, &profile(&name, &topics)?)?;
             cli::print(&if json { report.json() } else { report.to_string() })?;
-            Ok(Outcome::Done)
+            report.open_question.map_or(Ok(Outcome::Done), Err)
         }
         (None, Some(args)) => run(&args),
         (None, None) => unreachable!("clap asks for LOG"),
@@ -94,7 +117,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Ingest) -> Result<Outcome> {
     let logs = ingest::find_logs(&args.logs)?;
-    let config = manifest::IngestConfig::new(Profile::load(&args.profile)?, args.rate)?;
+    let config = manifest::IngestConfig::new(profile(&args.profile, &args.topics)?, args.rate)?;
     let bar = cli::progress(0, "frames", "ingest");
     let on = |event| match event {
         Event::Opened { ticks } => bar.inc_length(ticks),

@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     dataset::{
         align::{self, Grid, Signals, Tick},
+        conditions::conditions,
         control::Controls,
-        ego::EgoTrack,
         future::future,
+        motion::Motion,
         picture,
         ralidar::{lidar_pixels, radar_pixels},
         route::{Path, command},
@@ -20,11 +21,13 @@ use crate::{
     frame::{Conditions, Frame, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
-        mapping::{Mapping, PoseSource},
+        candidates::{RADIAL_SPEED_FIELDS, RELATIVE_VELOCITY_FIELDS, has_field},
+        mapping::Mapping,
         profile::Profile,
         reader::Place,
         recording::{Recording, Series, Stamped, Topic, mapping_error},
-        signals::{self, Pose},
+        rigs::Rig,
+        signals::{self, Kind, Pose},
     },
     projection::{Camera, Crop},
 };
@@ -44,7 +47,7 @@ pub struct Drive {
     /// Sensors that the log has and frames will not: each says why.
     pub left_out: Vec<String>,
     controls: Controls,
-    track: EgoTrack,
+    motion: Motion,
     driven: Path,
     /// Planned routes by the time from which they hold.
     planned: Vec<Stamped<Path>>,
@@ -95,8 +98,10 @@ impl Drive {
             return Err(mapping_error(&recording.log, what.to_string(), hint));
         }
         let mapping = Mapping::choose(&recording, profile)?;
+        let rig = mapping.rig.as_deref().and_then(Rig::named);
+        let profile = profile.on(rig.as_ref());
         let tolerance_ns = align::nanos(profile.tolerance_ms.ego);
-        let track = EgoTrack::new(&recording, &mapping, tolerance_ns)?;
+        let motion = Motion::new(&recording, &mapping, &profile.ego, tolerance_ns)?;
         let topic = |name: &Option<String>| recording.topics.get(name.as_ref()?);
         let Some(camera_topic) = topic(&mapping.camera) else {
             let hint = "frames need a camera: sensor_msgs/CompressedImage or sensor_msgs/Image; \
@@ -106,10 +111,11 @@ impl Drive {
 
         let mut notes = mapping.notes.clone();
         let mut left_out = Vec::new();
-        notes.extend(track.notes.iter().cloned());
+        notes.extend(motion.notes.iter().cloned());
         let applied = recording.log.metadata.get(CONDITIONS_RECORD);
         let applied = applied.and_then(|record| record.get(APPLIED_CONTROL)).cloned();
-        let controls = Controls::new(topic(&mapping.control), topic(&applied), profile, &track);
+        let (control, pedals) = (topic(&mapping.control), topic(&mapping.pedals));
+        let controls = Controls::new(control, pedals, topic(&applied), &profile, &motion.track);
         notes.extend(controls.notes.iter().cloned());
         let camera = match topic(&mapping.camera_info).map(|topic| &topic.series) {
             Some(Series::CameraInfo(infos)) => {
@@ -129,7 +135,7 @@ impl Drive {
                 ));
                 return Ok(None);
             }
-            Sensor::place(&recording, &mapping, camera_topic, topic).map(Some)
+            Sensor::place(&recording, &motion, camera_topic, topic).map(Some)
         };
         let lidar = sensor(&mapping.lidar, "lidar")?;
         let radar = sensor(&mapping.radar, "radar")?;
@@ -143,7 +149,7 @@ impl Drive {
         };
         let (lidar_samples, radar_samples) = (of(&lidar), of(&radar));
         let signals = Signals {
-            ego: &track,
+            ego: &motion.track,
             camera: &located(Some(camera_topic)),
             lidar: &lidar_samples,
             radar: &radar_samples,
@@ -157,17 +163,16 @@ impl Drive {
                         time; `pmp-ingest inspect LOG` shows when each begins and ends";
             return Err(mapping_error(&recording.log, what, hint));
         };
-        let planned = match topic(&mapping.route).map(|topic| &topic.series) {
-            Some(Series::Path(paths)) => paths
-                .iter()
-                .filter(|path| path.value.len() > 1)
-                .map(|path| Stamped { stamp_ns: path.stamp_ns, value: Path::planned(&path.value) })
-                .collect(),
-            _ => Vec::new(),
-        };
-        let conditions = conditions(&recording, profile);
-        let driven = Path::driven(&track);
-        let profile = profile.clone();
+        let (planned, unplaced) = planned_routes(topic(&mapping.route), &motion, &recording);
+        left_out.extend(unplaced);
+        if let Some(topic) = topic(&mapping.radar).filter(|topic| measures_no_speed(topic)) {
+            notes.push(format!(
+                "radar: {} measures no radial speed, so radar_speed is null; its returns are kept",
+                topic.name
+            ));
+        }
+        let conditions = conditions(&recording, &mapping, &profile, &mut notes);
+        let driven = Path::driven(&motion.track);
         Ok(Drive {
             mapping,
             profile,
@@ -177,7 +182,7 @@ impl Drive {
             notes,
             left_out,
             controls,
-            track,
+            motion,
             driven,
             planned,
             lidar,
@@ -273,7 +278,8 @@ impl Drive {
         });
         let radar = radar.zip(camera.as_ref()).and_then(|((topic, pose, bytes), camera)| {
             let returns = topic.decode(bytes);
-            let pixels = returns.and_then(|r| radar_pixels(topic.kind, &r, &pose, camera));
+            let pixels = returns
+                .and_then(|r| radar_pixels(topic.kind, &r, &self.profile.radar, &pose, camera));
             pixels.map_err(|error| keep(topic, error)).ok()
         });
 
@@ -297,7 +303,7 @@ impl Drive {
             action: self.controls.action(tick.control.as_ref().map(|sample| &sample.value)),
             command: command(&route),
             route,
-            future: future(&self.track, tick.stamp_ns, &tick.ego),
+            future: future(&self.motion.track, tick.stamp_ns, &tick.ego),
             skew,
             conditions: self.conditions.clone(),
             in_junction: None,
@@ -349,7 +355,7 @@ impl Sensor {
     /// Make sure that a sensor can be placed relative to the camera.
     fn place(
         recording: &Recording,
-        mapping: &Mapping,
+        motion: &Motion,
         camera: &Topic,
         sensor: &Topic,
     ) -> Result<Sensor> {
@@ -365,14 +371,9 @@ impl Sensor {
             );
             mapping_error(&recording.log, what, &hint)
         })?;
-        let ego_frame = match &mapping.pose {
-            Some(PoseSource::Topic(topic)) => recording.topics[topic].child_frame_id.as_deref(),
-            Some(PoseSource::Transform(frame)) => Some(frame.as_str()),
-            Some(PoseSource::Integrated { .. }) | None => None,
-        };
-        let optical_axis = ego_frame
-            .and_then(|ego| lookup(ego, &camera.frame_id).ok())
-            .map(|p| p.rotation * DVec3::Z);
+        let base_from_camera = motion.base.base_from(&camera.frame_id, &recording.transforms);
+        let optical_axis =
+            base_from_camera.map(|base_from_camera| base_from_camera.rotation * DVec3::Z);
         // A front camera does not look at the sky: a z axis that points up means that the frame
         // is the camera's body (x forward), whatever its header should name by convention.
         let is_body = optical_axis.is_some_and(|axis| axis.z.abs() > 0.8);
@@ -383,16 +384,33 @@ impl Sensor {
     }
 }
 
-/// Conditions from the log's metadata, completed by the profile.
-fn conditions(recording: &Recording, profile: &Profile) -> Conditions {
-    let record = recording.log.metadata.get(CONDITIONS_RECORD);
-    let get = |key: &str, fallback: &Option<String>| {
-        record.and_then(|record| record.get(key)).cloned().or_else(|| fallback.clone())
+/// Routes of a topic in the world of the ego motion; and, if there are some that cannot be brought
+/// there, how many and why.
+fn planned_routes(
+    topic: Option<&Topic>,
+    motion: &Motion,
+    recording: &Recording,
+) -> (Vec<Stamped<Path>>, Option<String>) {
+    let Some((topic, Series::Path(paths))) = topic.map(|topic| (topic, &topic.series)) else {
+        return (Vec::new(), None);
     };
-    Conditions {
-        town: get("town", &profile.conditions.town),
-        weather: get("weather", &profile.conditions.weather),
-        illumination: get("illumination", &profile.conditions.illumination),
-        traffic: get("traffic", &profile.conditions.traffic),
+    let (mut planned, mut unplaced) = (Vec::new(), Vec::new());
+    let paths: Vec<_> = paths.iter().filter(|path| path.value.len() > 1).collect();
+    for path in &paths {
+        let (frame, stamp_ns) = (&topic.frame_id, path.stamp_ns);
+        match motion.world_points(&path.value, frame, stamp_ns, &recording.transforms) {
+            Ok(points) => planned.push(Stamped { stamp_ns, value: Path::planned(&points) }),
+            Err(why) => unplaced.push(why),
+        }
     }
+    let why = unplaced.first().map(|why| {
+        format!("route {}: {} of {} left out, {why}", topic.name, unplaced.len(), paths.len())
+    });
+    (planned, why)
+}
+
+/// Whether a radar's clouds have no speed; scans and tracks always have one.
+fn measures_no_speed(radar: &Topic) -> bool {
+    let has_velocity = RELATIVE_VELOCITY_FIELDS.iter().all(|field| has_field(radar, &[field]));
+    radar.kind == Kind::PointCloud && !has_field(radar, &RADIAL_SPEED_FIELDS) && !has_velocity
 }

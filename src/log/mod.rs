@@ -3,7 +3,8 @@
 //! ```text
 //! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
 //!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
-//!           mapping: which topic is which signal        transforms: where each sensor sits
+//!           rigs, profile -> mapping: which topic is which signal
+//!           transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
 //!
@@ -33,7 +34,11 @@ pub mod cloud;
 pub mod decoder;
 pub mod transforms;
 pub mod recording;
+pub mod topics;
+pub mod conventions;
+pub mod rigs;
 pub mod profile;
+pub mod candidates;
 pub mod mapping;
 pub mod definitions;
 pub mod encode;

@@ -8,6 +8,7 @@ mod schemas;
 mod definitions;
 mod fixtures;
 mod foxglove_fixtures;
+mod rig_fixtures;
 mod decoding;
 mod ros1;
 mod idl;
@@ -16,6 +17,8 @@ mod protobuf;
 mod logs;
 mod alignment;
 mod ingest;
+mod rigs;
+mod conventions;
 mod real_drive;
 #[cfg(feature = "learning")]
 mod evaluation;

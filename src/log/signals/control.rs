@@ -41,3 +41,22 @@ pub fn carla_status(message: &Struct) -> Result<CarlaStatus> {
     let control = carla_control(message.part("control")?)?;
     Ok(CarlaStatus { speed_mps: message.number("velocity")?, control })
 }
+
+/// `autoware_vehicle_msgs/SteeringReport` (before: `autoware_auto_vehicle_msgs`): the angle of the
+/// front wheels, positive to the left.
+pub fn steering_report(message: &Struct) -> Result<Control> {
+    let angle = message.number("steering_tire_angle")?;
+    Ok(Control { steer: None, throttle: None, brake: None, wheel_angle_rad: Some(angle) })
+}
+
+/// `tier4_vehicle_msgs/ActuationStatusStamped`: the pedals. What its steering means differs from
+/// car to car.
+pub fn actuation(message: &Struct) -> Result<Control> {
+    let status = message.part("status")?;
+    Ok(Control {
+        steer: None,
+        throttle: Some(status.number("accel_status")?),
+        brake: Some(status.number("brake_status")?),
+        wheel_angle_rad: None,
+    })
+}

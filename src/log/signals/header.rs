@@ -13,9 +13,13 @@ pub struct Header {
     pub frame_id: String,
 }
 
-/// The header of a message that has one, or of a value that is one.
+/// The header of a message that has one, or of a value that is one. Autoware's reports have a bare
+/// stamp in its place, and so no frame.
 pub fn header(value: &Struct) -> Result<Header> {
     let header = value.part("header").unwrap_or(value);
+    if header.get("sec").is_some() {
+        return Ok(Header { stamp_ns: nanoseconds(header)?, frame_id: String::new() });
+    }
     // A transform of Foxglove's says of which two frames it is, and the parent is the one it is in.
     let frame_id = header.text("parent_frame_id").or_else(|_| header.text("frame_id"))?;
     let stamp_field = if header.get("timestamp").is_some() { "timestamp" } else { "stamp" };

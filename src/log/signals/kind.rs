@@ -16,10 +16,17 @@ pub enum Kind {
     Pose,
     Path,
     Imu,
+    Fix,
     Transforms,
     Ackermann,
     CarlaControl,
     CarlaStatus,
+    /// Angle of the wheels alone.
+    Steering,
+    /// Positions of the pedals alone.
+    Actuation,
+    Weather,
+    WorldInfo,
 }
 
 impl Kind {
@@ -42,15 +49,28 @@ impl Kind {
             "geometry_msgs/TwistStamped" | "geometry_msgs/TwistWithCovarianceStamped" => {
                 Kind::Twist
             }
+            "autoware_vehicle_msgs/VelocityReport"
+            | "autoware_auto_vehicle_msgs/VelocityReport" => Kind::Twist,
+            "autoware_vehicle_msgs/SteeringReport"
+            | "autoware_auto_vehicle_msgs/SteeringReport" => Kind::Steering,
+            "tier4_vehicle_msgs/ActuationStatusStamped" => Kind::Actuation,
             "geometry_msgs/PoseStamped" | "geometry_msgs/PoseWithCovarianceStamped" => Kind::Pose,
             "nav_msgs/Path" => Kind::Path,
             "sensor_msgs/Imu" => Kind::Imu,
+            "sensor_msgs/NavSatFix" => Kind::Fix,
             "tf2_msgs/TFMessage" | "tf/tfMessage" => Kind::Transforms,
             "ackermann_msgs/AckermannDriveStamped" => Kind::Ackermann,
             "carla_msgs/CarlaEgoVehicleControl" => Kind::CarlaControl,
             "carla_msgs/CarlaEgoVehicleStatus" => Kind::CarlaStatus,
+            "carla_msgs/CarlaWeatherParameters" => Kind::Weather,
+            "carla_msgs/CarlaWorldInfo" => Kind::WorldInfo,
             _ => return None,
         })
+    }
+
+    /// Whether its messages say when they were made; else the log's time has to do.
+    pub fn has_header(self) -> bool {
+        !matches!(self, Kind::Weather | Kind::WorldInfo)
     }
 
     /// The kinds of Foxglove's well-known schemas, <https://docs.foxglove.dev/docs/sdk/schemas>:
@@ -62,6 +82,7 @@ impl Kind {
             "CameraCalibration" => Kind::CameraInfo,
             "PointCloud" => Kind::PointCloud,
             "Odometry" => Kind::Odometry,
+            "LocationFix" => Kind::Fix,
             "PoseInFrame" => Kind::Pose,
             "PosesInFrame" => Kind::Path,
             "FrameTransform" | "FrameTransforms" => Kind::Transforms,

@@ -12,13 +12,19 @@ pub mod control;
 pub mod camera;
 pub mod radar;
 pub mod route;
+pub mod conditions;
 
 pub use camera::{Encoding, Picture, camera_info, picture};
-pub use control::{CarlaStatus, Control, ackermann, carla_control, carla_status};
-pub use ego::{Odometry, angular_velocity, child_frame, odometry, stamped_pose, stamped_twist};
+pub use conditions::{Weather, carla_town, carla_weather};
+pub use control::{
+    CarlaStatus, Control, ackermann, actuation, carla_control, carla_status, steering_report,
+};
+pub use ego::{
+    Fix, Inertial, Odometry, child_frame, fix, inertial, odometry, stamped_pose, stamped_twist,
+};
 pub use frames::transforms;
 pub use geometry::{Pose, pose};
 pub use header::{Header, header, header_of_first_field};
 pub use kind::Kind;
-pub use radar::{RadarReturn, radar_scan, radar_tracks};
+pub use radar::{RadarReturn, polar, radar_scan, radar_tracks};
 pub use route::path;

@@ -11,26 +11,28 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadarReturn {
     pub position_m: DVec3,
-    /// Radial speed relative to the sensor, m/s, negative = approaching.
-    pub radial_speed_mps: f64,
+    /// Radial speed relative to the sensor, m/s, negative = approaching; `None` of a radar that does
+    /// not measure it.
+    pub radial_speed_mps: Option<f64>,
 }
 
 /// `radar_msgs/RadarScan`: polar returns, elevation and azimuth as REP-103 turns them.
 pub fn radar_scan(message: &Struct) -> Result<Vec<RadarReturn>> {
-    let polar = |part: &Struct| {
+    let one = |part: &Struct| {
         let (range, azimuth) = (part.number("range")?, part.number("azimuth")?);
-        let (sin_elevation, cos_elevation) = part.number("elevation")?.sin_cos();
-        let flat = range * cos_elevation;
         Ok(RadarReturn {
-            position_m: DVec3::new(
-                flat * azimuth.cos(),
-                flat * azimuth.sin(),
-                range * sin_elevation,
-            ),
-            radial_speed_mps: part.number("doppler_velocity")?,
+            position_m: polar(range, azimuth, part.number("elevation")?),
+            radial_speed_mps: Some(part.number("doppler_velocity")?),
         })
     };
-    message.parts("returns")?.map(polar).collect()
+    message.parts("returns")?.map(one).collect()
+}
+
+/// A place by its distance and two angles: azimuth grows to the left, elevation upwards.
+pub fn polar(range_m: f64, azimuth_rad: f64, elevation_rad: f64) -> DVec3 {
+    let flat_m = range_m * elevation_rad.cos();
+    let (sin, cos) = azimuth_rad.sin_cos();
+    DVec3::new(flat_m * cos, flat_m * sin, range_m * elevation_rad.sin())
 }
 
 /// `radar_msgs/RadarTracks`: the radial part of each track's velocity.
@@ -39,7 +41,7 @@ pub fn radar_tracks(message: &Struct) -> Result<Vec<RadarReturn>> {
         let (position_m, velocity) =
             (vector(part.part("position")?)?, vector(part.part("velocity")?)?);
         let radial_speed_mps = velocity.dot(position_m.normalize_or_zero());
-        Ok(RadarReturn { position_m, radial_speed_mps })
+        Ok(RadarReturn { position_m, radial_speed_mps: Some(radial_speed_mps) })
     };
     message.parts("tracks")?.map(track).collect()
 }
