@@ -43,9 +43,10 @@ pub fn positions(
 pub fn headings(
     topic: &Topic,
     positions: &[Stamped<DVec3>],
-    base: &BaseFrame,
-    axes: &WorldAxes,
+    antenna_ahead_m: f64,
+    (base, axes): (&BaseFrame, &WorldAxes),
     transforms: &TransformTree,
+    notes: &mut Vec<String>,
 ) -> Option<Headings> {
     if let Series::Imu(samples) = &topic.series
         && samples.iter().all(|sample| sample.value.attitude.is_some())
@@ -57,10 +58,10 @@ pub fn headings(
             let attitude = axes.pose(&world_from_sensor.then(&sensor_from_base)).rotation;
             Some(Stamped { stamp_ns: sample.stamp_ns, value: attitude })
         });
-        return Some(Headings::measured(attitudes));
+        return Some(Headings::measured(attitudes, positions, antenna_ahead_m, notes));
     }
     let rates = yaw_rates(topic, base, axes, transforms);
-    Headings::from_courses(positions, &rates)
+    Headings::from_courses(positions, &rates, antenna_ahead_m)
 }
 
 /// Rates of turning to the left, rad/s.

@@ -21,6 +21,10 @@ const COURSE_NS: i64 = 3_000_000_000;
 /// than a gyroscope drifts.
 const AVERAGED_NS: i64 = 10_000_000_000;
 
+/// A mean distance from courses beyond which an attitude is not that of the world: slip and mounts
+/// stay below 10 degrees, unknown norths are anywhere.
+const ASTRAY_RAD: f64 = 0.35;
+
 /// Headings by time, in (-pi, pi].
 #[derive(Clone, Debug)]
 pub struct Headings {
@@ -32,36 +36,67 @@ pub struct Headings {
 
 impl Headings {
     /// From measured attitudes.
-    pub fn measured(attitudes: impl Iterator<Item = Stamped<DQuat>>) -> Headings {
+    ///
+    /// Not every IMU knows where east is. Where attitudes lie further from the courses over ground
+    /// than [`ASTRAY_RAD`], only their change is believed, and a note says so.
+    pub fn measured(
+        attitudes: impl Iterator<Item = Stamped<DQuat>>,
+        positions: &[Stamped<DVec3>],
+        antenna_ahead_m: f64,
+        notes: &mut Vec<String>,
+    ) -> Headings {
         let yaw = |a: Stamped<DQuat>| Stamped {
             stamp_ns: a.stamp_ns,
             value: a.value.to_euler(EulerRot::ZYX).0,
         };
-        Headings {
-            turned_rad: attitudes.map(yaw).collect(),
-            offsets_rad: vec![Stamped { stamp_ns: 0, value: 0.0 }],
+        let turned_rad: Vec<_> = attitudes.map(yaw).collect();
+        if let Some(joined) = Headings::joined(turned_rad.clone(), positions, antenna_ahead_m) {
+            let (offset_rad, courses) = (mean(&joined.offsets_rad), joined.offsets_rad.len());
+            if offset_rad.abs() > ASTRAY_RAD {
+                notes.push(format!(
+                    "pose: the measured attitude lies {:.0} degrees off {courses} courses over \
+                     ground; its changes are used, joined to these",
+                    -offset_rad.to_degrees()
+                ));
+                return joined;
+            }
         }
+        Headings { turned_rad, offsets_rad: vec![Stamped { stamp_ns: 0, value: 0.0 }] }
     }
 
-    /// From courses over ground, joined by rates of turning to the left.
+    /// From courses over ground, joined by rates of turning to the left; `None` if the car never
+    /// moves far enough for a course.
     ///
-    /// A course is that of the middle between two positions, where its chord and the car's heading
-    /// agree; slip and reversing are not told apart from it.
+    /// A course is that of the middle between two positions, where its chord and the motion agree.
+    /// An antenna ahead of the car's origin moves sideways in a bend, which is taken out; slip and
+    /// reversing are not told apart from it.
     pub fn from_courses(
         positions: &[Stamped<DVec3>],
         rates_radps: &[Stamped<f64>],
+        antenna_ahead_m: f64,
     ) -> Option<Headings> {
-        let turned_rad = integrated(rates_radps);
-        let turned =
-            Headings { turned_rad, offsets_rad: vec![Stamped { stamp_ns: 0, value: 0.0 }] };
+        Headings::joined(integrated(rates_radps), positions, antenna_ahead_m)
+    }
+
+    /// Angles turned since some instant, joined to courses.
+    fn joined(
+        turned_rad: Vec<Stamped<f64>>,
+        positions: &[Stamped<DVec3>],
+        antenna_ahead_m: f64,
+    ) -> Option<Headings> {
+        let offsets_rad = vec![Stamped { stamp_ns: 0, value: 0.0 }];
+        let mut headings = Headings { turned_rad, offsets_rad };
         let offsets = courses(positions).into_iter().filter_map(|course| {
-            let turned = turned.at(course.stamp_ns)?;
-            Some(Stamped { stamp_ns: course.stamp_ns, value: wrap_angle(course.value - turned) })
+            let middle_ns = course.from_ns + (course.to_ns - course.from_ns) / 2;
+            let turned = headings.at(course.to_ns)? - headings.at(course.from_ns)?;
+            let sideways_m = antenna_ahead_m * wrap_angle(turned);
+            let aside_rad = (sideways_m / course.length_m).clamp(-1.0, 1.0).asin();
+            let value = wrap_angle(course.angle_rad - aside_rad - headings.at(middle_ns)?);
+            Some(Stamped { stamp_ns: middle_ns, value })
         });
         let offsets: Vec<_> = offsets.collect();
-        let averaged: Vec<_> = offsets.iter().map(|at| averaged(&offsets, at.stamp_ns)).collect();
-        (!averaged.is_empty())
-            .then_some(Headings { turned_rad: turned.turned_rad, offsets_rad: averaged })
+        headings.offsets_rad = offsets.iter().map(|at| averaged(&offsets, at.stamp_ns)).collect();
+        (!offsets.is_empty()).then_some(headings)
     }
 
     /// The heading at an instant; `None` where there is no measurement on either side, or no two
@@ -102,19 +137,31 @@ fn integrated(rates_radps: &[Stamped<f64>]) -> Vec<Stamped<f64>> {
     turned
 }
 
-/// Courses between positions, each at the middle of its two positions in time.
-fn courses(positions: &[Stamped<DVec3>]) -> Vec<Stamped<f64>> {
+/// The way between two positions.
+struct Course {
+    from_ns: i64,
+    to_ns: i64,
+    length_m: f64,
+    angle_rad: f64,
+}
+
+/// Courses from every position to the next that is far enough, if it is near enough in time.
+fn courses(positions: &[Stamped<DVec3>]) -> Vec<Course> {
     let mut courses = Vec::new();
     for (i, from) in positions.iter().enumerate() {
+        let way = |to: &Stamped<DVec3>| (to.value - from.value).truncate();
         let far = |to: &&Stamped<DVec3>| {
-            (to.value - from.value).truncate().length() >= COURSE_M
-                || to.stamp_ns - from.stamp_ns > COURSE_NS
+            way(to).length() >= COURSE_M || to.stamp_ns - from.stamp_ns > COURSE_NS
         };
         let Some(to) = positions[i + 1..].iter().find(far) else { break };
         if to.stamp_ns - from.stamp_ns <= COURSE_NS {
-            let way = to.value - from.value;
-            let stamp_ns = from.stamp_ns + (to.stamp_ns - from.stamp_ns) / 2;
-            courses.push(Stamped { stamp_ns, value: way.y.atan2(way.x) });
+            let way = way(to);
+            courses.push(Course {
+                from_ns: from.stamp_ns,
+                to_ns: to.stamp_ns,
+                length_m: way.length(),
+                angle_rad: way.y.atan2(way.x),
+            });
         }
     }
     courses
@@ -124,8 +171,13 @@ fn courses(positions: &[Stamped<DVec3>]) -> Vec<Stamped<f64>> {
 fn averaged(angles: &[Stamped<f64>], stamp_ns: i64) -> Stamped<f64> {
     let from = angles.partition_point(|a| a.stamp_ns < stamp_ns - AVERAGED_NS);
     let to = angles.partition_point(|a| a.stamp_ns <= stamp_ns + AVERAGED_NS);
-    let (sin, cos) = angles[from..to]
+    Stamped { stamp_ns, value: mean(&angles[from..to]) }
+}
+
+/// The direction of the sum of unit vectors.
+fn mean(angles: &[Stamped<f64>]) -> f64 {
+    let (sin, cos) = angles
         .iter()
         .fold((0.0, 0.0), |(sin, cos), angle| (sin + angle.value.sin(), cos + angle.value.cos()));
-    Stamped { stamp_ns, value: f64::atan2(sin, cos) }
+    f64::atan2(sin, cos)
 }

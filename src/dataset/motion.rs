@@ -86,7 +86,9 @@ impl Motion {
                 let speed = speed.as_ref().map(|name| speeds(&topics[name], &base, &axes, tree));
                 let antenna = base.base_from(&topics[fix].frame_id, tree);
                 let antenna_m = antenna.map_or(DVec3::ZERO, |antenna| antenna.position_m);
-                let headings = gnss::headings(&topics[heading], &positions, &base, &axes, tree);
+                let (heading, frames) = (&topics[heading], (&base, &axes));
+                let headings =
+                    gnss::headings(heading, &positions, antenna_m.x, frames, tree, &mut notes);
                 let poses = headings.map(|headings| {
                     gnss::poses(&positions, &headings, antenna_m, &speed.unwrap_or_default())
                 });

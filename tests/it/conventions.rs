@@ -240,6 +240,22 @@ fn positions_from_satellites_make_the_drive_with_attitudes_or_with_rates_of_turn
 }
 
 #[test]
+fn an_attitude_that_does_not_know_north_is_joined_to_the_courses() {
+    let told = log(|m, t| {
+        if t == 0.0 {
+            m.transform("/tf_static", ["base_link", "gps"], t, ANTENNA_M, NONE);
+        }
+        m.fix("/gps", t, 0, place(t));
+        let attitude = yaw_quaternion(pose(t)[2] - 2.0);
+        m.imu("/imu", "base_link", t, Some(attitude), [0.0, 0.0, YAW_RATE_RADPS]);
+    });
+    let (frames, notes) = frames_of(&told, "");
+    bends_to_the_left(&frames, 0.06);
+    assert!((frames[10].yaw_rad - 0.2).abs() < 0.02, "{}", frames[10].yaw_rad);
+    assert!(notes.iter().any(|note| note.contains("lies -115 degrees off")), "{notes:?}");
+}
+
+#[test]
 fn a_speed_carries_the_pose_from_one_fix_a_second_to_the_next_and_nothing_else_does() {
     let named = "[topics]\ngnss = \"/gps\"\n";
     let (frames, _) = frames_of(&satellites(1.0, false, true), named);
