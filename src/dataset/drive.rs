@@ -14,20 +14,20 @@ use crate::{
         motion::Motion,
         picture,
         ralidar::{lidar_pixels, radar_pixels},
-        route::{Path, command},
+        route::{self, Path, command},
     },
     drops::Reason,
     error::Result,
     frame::{Conditions, Frame, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
-        candidates::{RADIAL_SPEED_FIELDS, RELATIVE_VELOCITY_FIELDS, has_field},
+        candidates::measures_no_speed,
         mapping::Mapping,
         profile::Profile,
         reader::Place,
         recording::{Recording, Series, Stamped, Topic, mapping_error},
         rigs::Rig,
-        signals::{self, Kind, Pose},
+        signals::{self, Pose},
     },
     projection::{Camera, Crop},
 };
@@ -163,7 +163,8 @@ impl Drive {
                         time; `pmp-ingest inspect LOG` shows when each begins and ends";
             return Err(mapping_error(&recording.log, what, hint));
         };
-        let (planned, unplaced) = planned_routes(topic(&mapping.route), &motion, &recording);
+        let (planned, unplaced) =
+            route::planned(topic(&mapping.route), &motion, &recording.transforms);
         left_out.extend(unplaced);
         if let Some(topic) = topic(&mapping.radar).filter(|topic| measures_no_speed(topic)) {
             notes.push(format!(
@@ -382,35 +383,4 @@ impl Sensor {
         let optical_from_camera = Pose { position_m: DVec3::ZERO, rotation };
         Ok(Sensor { topic: sensor.name.clone(), optical_from_camera })
     }
-}
-
-/// Routes of a topic in the world of the ego motion; and, if there are some that cannot be brought
-/// there, how many and why.
-fn planned_routes(
-    topic: Option<&Topic>,
-    motion: &Motion,
-    recording: &Recording,
-) -> (Vec<Stamped<Path>>, Option<String>) {
-    let Some((topic, Series::Path(paths))) = topic.map(|topic| (topic, &topic.series)) else {
-        return (Vec::new(), None);
-    };
-    let (mut planned, mut unplaced) = (Vec::new(), Vec::new());
-    let paths: Vec<_> = paths.iter().filter(|path| path.value.len() > 1).collect();
-    for path in &paths {
-        let (frame, stamp_ns) = (&topic.frame_id, path.stamp_ns);
-        match motion.world_points(&path.value, frame, stamp_ns, &recording.transforms) {
-            Ok(points) => planned.push(Stamped { stamp_ns, value: Path::planned(&points) }),
-            Err(why) => unplaced.push(why),
-        }
-    }
-    let why = unplaced.first().map(|why| {
-        format!("route {}: {} of {} left out, {why}", topic.name, unplaced.len(), paths.len())
-    });
-    (planned, why)
-}
-
-/// Whether a radar's clouds have no speed; scans and tracks always have one.
-fn measures_no_speed(radar: &Topic) -> bool {
-    let has_velocity = RELATIVE_VELOCITY_FIELDS.iter().all(|field| has_field(radar, &[field]));
-    radar.kind == Kind::PointCloud && !has_field(radar, &RADIAL_SPEED_FIELDS) && !has_velocity
 }

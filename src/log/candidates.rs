@@ -201,9 +201,15 @@ fn is_photograph(topic: &Topic) -> bool {
 }
 
 /// Whether a cloud has one of these fields, upper or lower case.
-pub fn has_field(topic: &Topic, names: &[&str]) -> bool {
+fn has_field(topic: &Topic, names: &[&str]) -> bool {
     let is_one = |field: &String| names.iter().any(|name| field.eq_ignore_ascii_case(name));
     topic.cloud_fields.iter().any(is_one)
+}
+
+/// Whether a radar's clouds have no speed; scans and tracks always have one.
+pub fn measures_no_speed(radar: &Topic) -> bool {
+    let has_velocity = RELATIVE_VELOCITY_FIELDS.iter().all(|field| has_field(radar, &[field]));
+    radar.kind == Kind::PointCloud && !has_field(radar, &RADIAL_SPEED_FIELDS) && !has_velocity
 }
 
 fn is_radar(topic: &Topic) -> bool {
@@ -225,8 +231,8 @@ fn is_lidar(topic: &Topic) -> bool {
 }
 
 fn is_goal(topic: &Topic) -> bool {
-    // A goal is a pose that somebody wants, not one that the car had.
-    name_of(topic).contains("goal")
+    // Goals and first guesses are poses that somebody wants or thinks of, not ones that the car had.
+    ["goal", "initialpose", "initial_pose"].iter().any(|word| name_of(topic).contains(word))
 }
 
 /// A twist that says what was asked for, not what happened.

@@ -294,7 +294,7 @@ impl<'r> Chooser<'r> {
         let is_own = |topic: &&Topic| candidates::is_own_frame_pose(topic, self.recording);
         for topic in self.recording.topics.values().filter(is_own) {
             self.notes.push(format!(
-                "pose: {} is told in the car's own frame `{}`, so it is not how the car moves",
+                "pose: {} is told in the car's own frame (`{}`), so it is not how the car moves",
                 topic.name, topic.frame_id
             ));
         }

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::log::{
     conventions::{ControlRule, EgoRule, RadarRule},
-    topics::{Topics, matches},
+    topics::{Names, Topics, matches},
 };
 
 /// Name and text of every rig, in the order in which they are tried on a log.
@@ -43,8 +43,8 @@ pub struct Rig {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recognise {
-    /// Names with `*` for segments that vary; there is a topic for each.
-    pub topics: Vec<String>,
+    /// Of each of these, one is there.
+    pub topics: Vec<Names>,
 }
 
 impl Rig {
@@ -65,8 +65,8 @@ impl Rig {
     /// The first rig that could have written a log with these topics.
     pub fn of_log(topics: &[&str]) -> Option<Rig> {
         Rig::names().filter_map(Rig::named).find(|rig| {
-            let has = |pattern: &String| topics.iter().any(|topic| matches(pattern, topic));
-            rig.recognise.topics.iter().all(has)
+            let has = |name: &str| topics.iter().any(|topic| matches(name, topic));
+            rig.recognise.topics.iter().all(|names| names.iter().any(has))
         })
     }
 }

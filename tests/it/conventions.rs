@@ -17,7 +17,7 @@ use crate::{
     fixtures::shared,
     ingest::text,
     rig_fixtures::{
-        CAMERA_M, CARLA_RADAR_FIELDS, CLOSING_MPS, Messages, NONE, OPTICAL, SPEED_MPS,
+        CAMERA_M, CARLA_RADAR_FIELDS, CLOSING_MPS, Messages, NONE, OPTICAL, POINTS, SPEED_MPS,
         YAW_RATE_RADPS, at_rate, carla_radar_point, header, pose, yaw_quaternion,
     },
     rigs::{bends_to_the_left, ingested},
@@ -161,6 +161,43 @@ fn the_pose_of_an_optical_frame_that_nothing_ties_to_the_car_is_known_by_its_mot
     let (frames, notes) = frames_of(&told, "");
     same_motion(&frames, &expected, 1e-6);
     assert!(notes.iter().any(|note| note.contains("no transform ties to the car")), "{notes:?}");
+}
+
+#[test]
+fn a_lidar_falls_on_the_picture_whose_frame_the_pose_is_of() {
+    // As converters of KITTI's odometry sequences write it: all hangs on the left camera.
+    let optical = quaternion(OPTICAL);
+    let velo_m = [-0.3, 0.0, 0.1];
+    let told = log(|m, t| {
+        odometry(m, ["world", "camera"], t, optical.inverse(), (DVec3::ZERO, optical));
+        if t == 0.0 {
+            let place = [-velo_m[1], -velo_m[2], velo_m[0]];
+            m.transform("/tf_static", ["camera", "velo"], t, place, optical.inverse().to_array());
+        }
+        m.lidar("/velo", "velo", t, velo_m);
+    });
+    let (frames, _) = frames_of(&told, "");
+    // The camera is the car's origin here.
+    let pixel = |[x, y, z]: [f64; 3]| {
+        let (u, v) = (300.0 - 300.0 * y / x, 125.0 - 300.0 * z / x);
+        v as u32 * 600 + u as u32
+    };
+    let mut expected = POINTS.map(pixel);
+    expected.sort_unstable();
+    assert_eq!(frames[0].lidar.as_ref().unwrap().pixel, expected);
+}
+
+#[test]
+fn a_pose_that_stays_the_identity_while_tf_moves_is_not_the_cars() {
+    let told = log(|m, t| {
+        let [x, y, yaw] = pose(t);
+        m.transform("/tf", ["map", "base_link"], t, [x, y, 0.0], yaw_quaternion(yaw));
+        let mut cdr = header(t, "map");
+        m.add("/pose", "geometry_msgs/PoseStamped", t, cdr.f64s(&[0.0; 3]).f64s(&NONE));
+    });
+    let (frames, notes) = frames_of(&told, "");
+    bends_to_the_left(&frames, 0.01);
+    assert!(notes.iter().any(|note| note.starts_with("pose: /pose is told in the car's own")));
 }
 
 #[test]

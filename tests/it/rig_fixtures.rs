@@ -457,8 +457,6 @@ pub(crate) fn nuscenes() -> Vec<u8> {
         tell("/tf", "FrameTransform", t, "", radar);
         let none = json!({"position": vector([0.0; 3]), "orientation": rotation(NONE)});
         tell("/pose", "PoseInFrame", t, "base_link", json!({"pose": none}));
-        tell("/markers/annotations", "PosesInFrame", t, "map", json!({"poses": []}));
-        tell("/semantic_map", "PosesInFrame", t, "map", json!({"poses": []}));
     }
     for t in at_rate(10.0) {
         let [width, height] = SIZE;

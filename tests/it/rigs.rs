@@ -321,8 +321,8 @@ fn a_profile_of_ones_own_may_build_on_a_rig() {
 fn the_pose_in_the_cars_own_frame_is_not_how_it_moves() {
     let folder = tempfile::tempdir().unwrap();
     let (_, _, record) = ingested(folder.path(), &nuscenes(), &[]);
-    let note = "pose: /pose is told in the car's own frame `base_link`, so it is not how the car \
-                moves";
+    let note = "pose: /pose is told in the car's own frame (`base_link`), so it is not how the \
+                car moves";
     assert!(record.notes.iter().any(|other| other == note), "{:?}", record.notes);
     let uses: BTreeMap<&str, Option<String>> =
         ["/pose", "/lidar_top"].map(|topic| (topic, record.mapping.uses(topic))).into();
