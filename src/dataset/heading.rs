@@ -37,8 +37,8 @@ pub struct Headings {
 impl Headings {
     /// From measured attitudes.
     ///
-    /// Not every IMU knows where east is. Where attitudes lie further from the courses over ground
-    /// than [`ASTRAY_RAD`], only their change is believed, and a note says so.
+    /// Not every IMU knows where east is. Where attitudes lie more than 20 degrees off the courses
+    /// over ground, only their change is believed, and a note says so.
     pub fn measured(
         attitudes: impl Iterator<Item = Stamped<DQuat>>,
         positions: &[Stamped<DVec3>],

@@ -20,7 +20,7 @@ pub(crate) const FOCAL: f64 = 30.0;
 pub(crate) const SIZE: [usize; 2] = [60, 25];
 
 /// Points of every cloud, in the car's frame.
-pub(crate) const POINTS: [[f64; 3]; 3] = [[21.5, 1.3, 1.0], [12.0, -2.2, 0.4], [31.5, 4.45, 2.9]];
+pub(crate) const POINTS: [[f64; 3]; 3] = [[21.5, 1.3, 1.0], [12.0, -2.2, 0.45], [31.5, 4.45, 2.9]];
 
 /// The return of every radar, in the car's frame, and how fast it comes nearer along its line of
 /// sight from the radar, which sits at the camera.
