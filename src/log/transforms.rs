@@ -9,6 +9,11 @@ use crate::log::signals::{Header, Pose};
 /// Longest step between two dynamic transforms that is interpolated across.
 const MAX_GAP_NS: i64 = 500_000_000;
 
+/// Changes below these are no motion: simulators compute mounts anew from world coordinates, and
+/// what they round differs from message to message.
+const STILL_M: f64 = 1e-3;
+const STILL_RAD: f64 = 1e-4;
+
 /// Longest chain of frames that is followed: a loop in the tree must not hang us.
 const MAX_CHAIN: usize = 64;
 
@@ -34,6 +39,12 @@ impl Pose {
         Pose { position_m: rotation * -self.position_m, rotation }
     }
 
+    /// Whether two poses differ by no more than rounding.
+    fn is_near(&self, other: &Pose) -> bool {
+        self.position_m.distance(other.position_m) <= STILL_M
+            && self.rotation.angle_between(other.rotation) <= STILL_RAD
+    }
+
     /// Between two poses: straight for the position, the shorter way round for the rotation.
     pub fn interpolate(&self, other: &Pose, fraction: f64) -> Pose {
         Pose {
@@ -50,7 +61,7 @@ struct Link {
     /// `parent_from_child` by stamp.
     poses: Vec<(i64, Pose)>,
     is_static: bool,
-    /// All poses are the same: a mount that was told again and again, or once, on a topic that
+    /// All poses are the same but for rounding: a mount that was told again and again, or once, on a topic that
     /// does not say that it is static. It holds at all times.
     is_fixed: bool,
 }
@@ -89,7 +100,8 @@ impl TransformTree {
     pub fn finish(&mut self) {
         for link in self.links.values_mut() {
             link.poses.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-            link.is_fixed = link.poses.windows(2).all(|pair| pair[0].1 == pair[1].1);
+            let is_still = |(_, pose): &(i64, Pose)| link.poses[0].1.is_near(pose);
+            link.is_fixed = link.poses.iter().all(is_still);
         }
     }
 

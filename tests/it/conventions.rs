@@ -164,6 +164,21 @@ fn the_pose_of_an_optical_frame_that_nothing_ties_to_the_car_is_known_by_its_mot
 }
 
 #[test]
+fn a_mount_that_is_rounded_anew_each_time_stands_still_and_one_that_nods_does_not() {
+    for (swing_m, ties) in [(1e-4, true), (0.1, false)] {
+        let told = log(|m, t| {
+            let place = [CAMERA_M[0], swing_m * (5.0 * t).sin(), CAMERA_M[2]];
+            m.transform("/tf", ["base_link", "sensor"], t, place, NONE);
+            let mount = (DVec3::from(CAMERA_M), DQuat::IDENTITY);
+            odometry(m, ["odom", "sensor"], t, DQuat::IDENTITY, mount);
+        });
+        let (_, notes) = frames_of(&told, "");
+        let note = "pose: of `sensor`, brought to `base_link` by the transforms".to_string();
+        assert_eq!(notes.contains(&note), ties, "{notes:?}");
+    }
+}
+
+#[test]
 fn a_lidar_falls_on_the_picture_whose_frame_the_pose_is_of() {
     // As converters of KITTI's odometry sequences write it: all hangs on the left camera.
     let optical = quaternion(OPTICAL);

@@ -154,7 +154,6 @@ fn returns_of_every_rig_fall_on_the_pixels_that_its_geometry_says() {
     lidar.sort_unstable();
     for rig in RIGS {
         let (_, frames, _) = ingested(folder.path(), &(rig.log)(), &[]);
-        // Transforms that are told with the samples begin and end with them.
         let frame = &frames[frames.len() / 2];
         let got = frame.lidar.as_ref().map(|lidar| lidar.pixel.clone());
         assert_eq!(got, rig.lidar.then(|| lidar.clone()), "{}", rig.name);

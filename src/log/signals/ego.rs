@@ -45,7 +45,7 @@ pub fn odometry(message: &Struct) -> Result<Odometry> {
         let twist = message.part("twist")?.part("twist")?;
         (message.part("pose")?.part("pose")?, twist, ["linear", "angular"])
     };
-    let velocity = |name: &str| {
+    let velocity = |name: &str| -> Result<DVec3> {
         let velocity = twist.optional_part(name)?.map(vector).transpose()?;
         Ok(velocity.unwrap_or(DVec3::ZERO))
     };
