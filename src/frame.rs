@@ -74,8 +74,9 @@ pub struct LidarPixels {
 pub struct RadarPixels {
     /// row x width + column.
     pub pixel: Vec<u32>,
-    /// Radial speed relative to the ego vehicle, m/s, negative = approaching.
-    pub speed_mps: Vec<f16>,
+    /// Radial speed relative to the ego vehicle, m/s, negative = approaching; `None` of a radar that
+    /// does not measure it.
+    pub speed_mps: Option<Vec<f16>>,
 }
 
 /// What the driver did. A channel is `None` where the log does not have it.

@@ -14,6 +14,7 @@ use pmp::{
     log::{
         clock::{self, Clock},
         profile::Profile,
+        rigs::Rig,
     },
 };
 
@@ -42,19 +43,30 @@ enum Inspect {
     Inspect {
         /// MCAP file
         log: PathBuf,
-        /// `auto`, `carla-ros-bridge`, or a FILE.toml
-        #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
+        #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
         profile: String,
-        /// Stamp a topic's messages by another instant than their header's
-        #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
-        clock: Vec<(String, Clock)>,
-        /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
-        #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
-        offset: Vec<(String, f64)>,
+        #[command(flatten)]
+        reading: Reading,
         /// Print JSON
         #[arg(long)]
         json: bool,
     },
+}
+
+/// What flags say of how to read a log.
+#[derive(Args)]
+struct Reading {
+    /// Name the topic of a signal, as camera=/front/image; may be given again
+    #[arg(long = "topic", value_name = "SIGNAL=NAME")]
+    topics: Vec<String>,
+
+    /// Stamp a topic's messages by another instant than their header's
+    #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
+    clock: Vec<(String, Clock)>,
+
+    /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
+    #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
+    offset: Vec<(String, f64)>,
 }
 
 #[derive(Args)]
@@ -67,17 +79,11 @@ struct Ingest {
     #[arg(short, long, value_name = "DATASET")]
     out: PathBuf,
 
-    /// How to read the logs: `auto`, `carla-ros-bridge`, or a FILE.toml
-    #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml")]
+    #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
     profile: String,
 
-    /// Stamp a topic's messages by another instant than their header's
-    #[arg(long, value_name = CLOCK, value_parser = clock::parse_clock)]
-    clock: Vec<(String, Clock)>,
-
-    /// Add to the stamps of a topic, as in `--offset /gps=-66.14s` (s, ms, us or ns)
-    #[arg(long, value_name = "TOPIC=TIME", value_parser = clock::parse_offset)]
-    offset: Vec<(String, f64)>,
+    #[command(flatten)]
+    reading: Reading,
 
     /// Ticks a second
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
@@ -93,15 +99,26 @@ struct Ingest {
     jobs: Option<usize>,
 }
 
-/// A profile, with what flags say of clocks in place of what it says.
-fn profile(name: &str, clocks: &[(String, Clock)], offsets: &[(String, f64)]) -> Result<Profile> {
+/// A profile, with what flags say of topics and clocks in place of what it says.
+fn profile(name: &str, reading: &Reading) -> Result<Profile> {
     let mut profile = Profile::load(name)?;
-    profile.clock.topics.extend(clocks.iter().cloned());
-    profile.clock.offset_s.extend(offsets.iter().cloned());
-    profile.check()?;
+    for topic in &reading.topics {
+        profile.topics.set(topic)?;
+    }
+    profile.clock.topics.extend(reading.clock.iter().cloned());
+    profile.clock.offset_s.extend(reading.offset.iter().cloned());
+    profile.clock.check()?;
     Ok(profile)
 }
 
+fn profile_help() -> String {
+    let names: Vec<_> = Rig::names().collect();
+    format!(
+        "How to read the logs: `auto` recognises the rig; a name of one forces it ({}); or a \
+         FILE.toml of your own",
+        names.join(", ")
+    )
+}
 const CLOCK: &str = "TOPIC=header|log|publish";
 
 const EXAMPLES: &str = "\
@@ -109,6 +126,7 @@ Examples:
   pmp-ingest --out data drives/              all logs below a folder
   pmp-ingest --out data a.mcap b.mcap --profile my-car.toml
   pmp-ingest --out data drives/ --shard 2/8  the second of eight processes that share the work
+  pmp-ingest --out data a.mcap --topic camera=/front_left/image
   pmp-ingest inspect a.mcap                  what is in a log, and what would be used
 
 Exit codes: 0 everything was used; 3 something was left out, the report says what; 1 failed; 2 misused";
@@ -116,10 +134,10 @@ Exit codes: 0 everything was used; 3 something was left out, the report says wha
 fn main() -> ExitCode {
     let cli = Cli::parse();
     cli::main(|| match (cli.command, cli.ingest) {
-        (Some(Inspect::Inspect { log, profile: name, clock, offset, json }), _) => {
-            let report = inspect::inspect(&log, &profile(&name, &clock, &offset)?)?;
+        (Some(Inspect::Inspect { log, profile: name, reading, json }), _) => {
+            let report = inspect::inspect(&log, &profile(&name, &reading)?)?;
             cli::print(&if json { report.json() } else { report.to_string() })?;
-            Ok(Outcome::Done)
+            report.open_question.map_or(Ok(Outcome::Done), Err)
         }
         (None, Some(args)) => run(&args),
         (None, None) => unreachable!("clap asks for LOG"),
@@ -128,7 +146,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Ingest) -> Result<Outcome> {
     let logs = ingest::find_logs(&args.logs)?;
-    let profile = profile(&args.profile, &args.clock, &args.offset)?;
+    let profile = profile(&args.profile, &args.reading)?;
     let config = manifest::IngestConfig::new(profile, args.rate)?;
     let bar = cli::progress(0, "frames", "ingest");
     let on = |event| match event {

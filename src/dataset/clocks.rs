@@ -83,6 +83,7 @@ pub fn check_overlap(
         Some(PoseSource::Topic(topic)) => topic.clone(),
         Some(PoseSource::Transform(frame)) => format!("/tf of `{frame}`"),
         Some(PoseSource::Integrated { speed, .. }) => speed.clone(),
+        Some(PoseSource::Gnss { fix, .. }) => fix.clone(),
         None => String::new(),
     };
     let samples = track.samples().len();

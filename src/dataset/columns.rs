@@ -112,7 +112,7 @@ pub fn to_columns(episode: &str, frames: &[Frame]) -> Result<RecordBatch, ArrowE
         lidar(|lidar| &lidar.y),
         lidar(|lidar| &lidar.z),
         list::<UInt32Type>(frames, |frame| frame.radar.as_ref().map(|r| r.pixel.as_slice())),
-        list::<Float16Type>(frames, |frame| frame.radar.as_ref().map(|r| r.speed_mps.as_slice())),
+        list::<Float16Type>(frames, |frame| frame.radar.as_ref()?.speed_mps.as_deref()),
         fixed::<Float32Type>(frames, 2, |frame| &frame.velocity_mps),
         Arc::new(frames.iter().map(|f| Some(f.yaw_rad)).collect::<PrimitiveArray<Float64Type>>()),
         fixed::<Float64Type>(frames, 3, |frame| &frame.position_m),
@@ -200,7 +200,7 @@ impl Columns<'_> {
         let radar = match self.list::<UInt32Type>("radar_pixel", row)? {
             Some(pixel) => Some(RadarPixels {
                 pixel,
-                speed_mps: self.list::<Float16Type>("radar_speed", row)?.unwrap_or_default(),
+                speed_mps: self.list::<Float16Type>("radar_speed", row)?,
             }),
             None => None,
         };

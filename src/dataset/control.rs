@@ -6,7 +6,7 @@ use crate::{
     log::{
         profile::{DEFAULT_STEERING_LOCK_RAD, Profile},
         recording::{Series, Stamped, Topic, nearest},
-        signals::{Control, Kind},
+        signals::Control,
     },
 };
 
@@ -52,23 +52,36 @@ impl Default for Recorded {
 }
 
 impl Controls {
-    /// Read the controls of a topic; `applied` is the topic of what moved the car instead, where
-    /// the driving was disturbed on purpose.
+    /// Read the controls of a topic; `pedals` is the topic of throttle and brake, where the first
+    /// has none, and `applied` that of what moved the car instead, where the driving was disturbed
+    /// on purpose.
     ///
     /// A channel that stays at exactly zero while the car does what only that channel can cause
     /// was not recorded: it becomes unknown, so that nobody learns never to brake from a log
     /// without a brake signal.
     pub fn new(
         topic: Option<&Topic>,
+        pedals: Option<&Topic>,
         applied: Option<&Topic>,
         profile: &Profile,
         track: &EgoTrack,
     ) -> Controls {
-        let Some(topic) = topic else { return Controls::default() };
-        let samples = samples_of(topic);
+        let Some(topic) = topic.or(pedals) else { return Controls::default() };
+        let mut samples = samples_of(topic);
         let mut notes = Vec::new();
+        let lacks_pedals =
+            samples.iter().all(|c| c.value.throttle.is_none() && c.value.brake.is_none());
+        if let Some(pedals) = pedals.filter(|_| lacks_pedals) {
+            notes.push(format!("control: throttle and brake from {}", pedals.name));
+            add_pedals(
+                &mut samples,
+                &samples_of(pedals),
+                (profile.tolerance_ms.control * 1e6) as i64,
+            );
+        }
         let steering_lock_rad = profile.control.steering_lock_rad.unwrap_or_else(|| {
-            if topic.kind == Kind::Ackermann {
+            if samples.iter().any(|c| c.value.steer.is_none() && c.value.wheel_angle_rad.is_some())
+            {
                 notes.push(format!(
                     "control: {} has wheel angles; full steering is assumed to be \
                      {DEFAULT_STEERING_LOCK_RAD} rad (profile key control.steering_lock_rad)",
@@ -127,6 +140,18 @@ impl Controls {
             steer: channel(control.steer.or(wheel), self.recorded.steer, -1.0),
             throttle: channel(control.throttle, self.recorded.throttle, 0.0),
             brake: channel(control.brake, self.recorded.brake, 0.0),
+        }
+    }
+}
+
+/// Throttle and brake of the nearest of other samples, where one is near enough.
+fn add_pedals(samples: &mut [Stamped<Control>], pedals: &[Stamped<Control>], tolerance_ns: i64) {
+    for sample in samples {
+        let near = nearest(pedals, sample.stamp_ns)
+            .filter(|near| near.stamp_ns.abs_diff(sample.stamp_ns) <= tolerance_ns as u64);
+        if let Some(near) = near {
+            sample.value.throttle = near.value.throttle;
+            sample.value.brake = near.value.brake;
         }
     }
 }

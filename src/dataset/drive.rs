@@ -9,22 +9,25 @@ use crate::{
     dataset::{
         align::{self, Grid, Signals, Tick},
         clocks,
+        conditions::conditions,
         control::Controls,
-        ego::EgoTrack,
         future::future,
+        motion::Motion,
         picture::{self, Rgb},
         ralidar::{lidar_pixels, radar_pixels},
-        route::{Path, command},
+        route::{self, Path, command},
     },
     drops::Reason,
     error::{Error, Result},
     frame::{Conditions, Frame, LidarPixels, RadarPixels, Route, Skew},
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
-        mapping::{Mapping, PoseSource},
+        candidates::measures_no_speed,
+        mapping::Mapping,
         profile::{CameraRule, Profile},
         reader::{Place, SegmentReader},
         recording::{Recording, Series, Stamped, Topic, Unused, mapping_error},
+        rigs::Rig,
         signals::{self, Pose},
     },
     projection::{Camera, Crop},
@@ -49,7 +52,7 @@ pub struct Drive {
     /// The topic of what moved the car, where that is not always what the driver wanted.
     pub applied_control: Option<String>,
     controls: Controls,
-    track: EgoTrack,
+    motion: Motion,
     driven: Path,
     /// Planned routes by the time from which they hold.
     planned: Vec<Stamped<Path>>,
@@ -124,8 +127,11 @@ impl Drive {
         let unreadable = unreadable(&recording, profile);
         let explain = |error| explained(error, &unreadable);
         let mapping = Mapping::choose(&recording, profile).map_err(explain)?;
+        let rig = mapping.rig.as_deref().and_then(Rig::named);
+        let profile = profile.on(rig.as_ref());
         let tolerance_ns = align::nanos(profile.tolerance_ms.ego);
-        let track = EgoTrack::new(&recording, &mapping, tolerance_ns).map_err(explain)?;
+        let motion =
+            Motion::new(&recording, &mapping, &profile.ego, tolerance_ns).map_err(explain)?;
         let topic = |name: &Option<String>| recording.topics.get(name.as_ref()?);
         let Some(camera_topic) = topic(&mapping.camera) else {
             let hint = "frames need a camera: sensor_msgs/CompressedImage or sensor_msgs/Image; \
@@ -135,12 +141,14 @@ impl Drive {
 
         let mut notes = mapping.notes.clone();
         notes.extend(unreadable.iter().cloned());
-        notes.extend(clocks::notes(&recording, &mapping, profile));
-        let mut left_out = clocks::check_overlap(&recording, &mapping, &profile.required, &track)?;
-        notes.extend(track.notes.iter().cloned());
+        notes.extend(clocks::notes(&recording, &mapping, &profile));
+        let mut left_out =
+            clocks::check_overlap(&recording, &mapping, &profile.required, &motion.track)?;
+        notes.extend(motion.notes.iter().cloned());
         let applied = recording.log.metadata.get(CONDITIONS_RECORD);
         let applied = applied.and_then(|record| record.get(APPLIED_CONTROL)).cloned();
-        let controls = Controls::new(topic(&mapping.control), topic(&applied), profile, &track);
+        let (control, pedals) = (topic(&mapping.control), topic(&mapping.pedals));
+        let controls = Controls::new(control, pedals, topic(&applied), &profile, &motion.track);
         notes.extend(controls.notes.iter().cloned());
         let camera = match topic(&mapping.camera_info).map(|topic| &topic.series) {
             Some(Series::CameraInfo(infos)) => {
@@ -160,7 +168,7 @@ impl Drive {
                 ));
                 return Ok(None);
             }
-            Sensor::place(&recording, &mapping, camera_topic, topic).map(Some)
+            Sensor::place(&recording, &motion, camera_topic, topic).map(Some)
         };
         let lidar = sensor(&mapping.lidar, "lidar")?;
         let radar = sensor(&mapping.radar, "radar")?;
@@ -174,7 +182,7 @@ impl Drive {
         };
         let (lidar_samples, radar_samples) = (of(&lidar), of(&radar));
         let signals = Signals {
-            ego: &track,
+            ego: &motion.track,
             camera: &located(Some(camera_topic)),
             lidar: &lidar_samples,
             radar: &radar_samples,
@@ -188,20 +196,20 @@ impl Drive {
                         time; `pmp-ingest inspect LOG` shows when each begins and ends";
             return Err(mapping_error(&recording.log, what, hint));
         };
-        let planned = match topic(&mapping.route).map(|topic| &topic.series) {
-            Some(Series::Path(paths)) => paths
-                .iter()
-                .filter(|path| path.value.len() > 1)
-                .map(|path| Stamped { stamp_ns: path.stamp_ns, value: Path::planned(&path.value) })
-                .collect(),
-            _ => Vec::new(),
-        };
+        let (planned, unplaced) =
+            route::planned(topic(&mapping.route), &motion, &recording.transforms);
+        left_out.extend(unplaced);
+        if let Some(topic) = topic(&mapping.radar).filter(|topic| measures_no_speed(topic)) {
+            notes.push(format!(
+                "radar: {} measures no radial speed, so radar_speed is null; its returns are kept",
+                topic.name
+            ));
+        }
         let picture_size = picture_size(&recording, camera_topic)?;
         let stored = |camera: &Camera| stored_camera(camera, picture_size, &profile.camera);
         let stored_camera = camera.as_ref().map(stored).transpose()?;
-        let conditions = conditions(&recording, profile);
-        let driven = Path::driven(&track);
-        let profile = profile.clone();
+        let conditions = conditions(&recording, &mapping, &profile, &mut notes);
+        let driven = Path::driven(&motion.track);
         Ok(Drive {
             mapping,
             profile,
@@ -213,7 +221,7 @@ impl Drive {
             left_out,
             applied_control: applied,
             controls,
-            track,
+            motion,
             driven,
             planned,
             lidar,
@@ -283,7 +291,13 @@ impl Drive {
                     message,
                     stamp_ns,
                     |topic, message, pose, camera| {
-                        radar_pixels(topic.kind, &topic.decode(message)?, pose, camera)
+                        radar_pixels(
+                            topic.kind,
+                            &topic.decode(message)?,
+                            &self.profile.radar,
+                            pose,
+                            camera,
+                        )
                     },
                 )),
             };
@@ -343,7 +357,7 @@ impl Drive {
             action: self.controls.action(tick.control.as_ref().map(|sample| &sample.value)),
             command: command(&route),
             route,
-            future: future(&self.track, tick.stamp_ns, &tick.ego),
+            future: future(&self.motion.track, tick.stamp_ns, &tick.ego),
             skew,
             conditions: self.conditions.clone(),
             in_junction: None,
@@ -439,7 +453,7 @@ impl Sensor {
     /// Make sure that a sensor can be placed relative to the camera.
     fn place(
         recording: &Recording,
-        mapping: &Mapping,
+        motion: &Motion,
         camera: &Topic,
         sensor: &Topic,
     ) -> Result<Sensor> {
@@ -455,14 +469,9 @@ impl Sensor {
             );
             mapping_error(&recording.log, what, &hint)
         })?;
-        let ego_frame = match &mapping.pose {
-            Some(PoseSource::Topic(topic)) => recording.topics[topic].child_frame_id.as_deref(),
-            Some(PoseSource::Transform(frame)) => Some(frame.as_str()),
-            Some(PoseSource::Integrated { .. }) | None => None,
-        };
-        let optical_axis = ego_frame
-            .and_then(|ego| lookup(ego, &camera.frame_id).ok())
-            .map(|p| p.rotation * DVec3::Z);
+        let base_from_camera = motion.base.base_from(&camera.frame_id, &recording.transforms);
+        let optical_axis =
+            base_from_camera.map(|base_from_camera| base_from_camera.rotation * DVec3::Z);
         // A front camera does not look at the sky: a z axis that points up means that the frame
         // is the camera's body (x forward), whatever its header should name by convention.
         let is_body = optical_axis.is_some_and(|axis| axis.z.abs() > 0.8);
@@ -489,19 +498,5 @@ fn explained(error: Error, unreadable: &[String]) -> Error {
             Error::Mapping { path, what, hint }
         }
         error => error,
-    }
-}
-
-/// Conditions from the log's metadata, completed by the profile.
-fn conditions(recording: &Recording, profile: &Profile) -> Conditions {
-    let record = recording.log.metadata.get(CONDITIONS_RECORD);
-    let get = |key: &str, fallback: &Option<String>| {
-        record.and_then(|record| record.get(key)).cloned().or_else(|| fallback.clone())
-    };
-    Conditions {
-        town: get("town", &profile.conditions.town),
-        weather: get("weather", &profile.conditions.weather),
-        illumination: get("illumination", &profile.conditions.illumination),
-        traffic: get("traffic", &profile.conditions.traffic),
     }
 }

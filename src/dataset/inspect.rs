@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt, path::Path};
 use serde::Serialize;
 
 use crate::{
-    error::Result,
+    error::{Error, Result},
     log::{
         mapping::Mapping,
         profile::Profile,
@@ -31,12 +31,15 @@ pub struct TopicReport {
 }
 
 /// A log, looked at.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct LogReport {
     pub size_bytes: u64,
     pub messages: u64,
     pub topics: Vec<TopicReport>,
     pub mapping: Mapping,
+    /// Why there is no mapping, where a question is open.
+    #[serde(skip)]
+    pub open_question: Option<Error>,
     pub damage: Vec<Damage>,
     /// Transforms of the log: `parent -> child`.
     pub transforms: Vec<String>,
@@ -44,13 +47,18 @@ pub struct LogReport {
 
 /// Look at a log without writing anything.
 ///
+/// Where topics cannot be chosen, the report still lists them all, and has the reason.
+///
 /// # Errors
 ///
-/// If the file is no readable log, or the profile names a topic that is not there.
+/// If the file is no readable log.
 pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
     let recordings = Recording::scan(path, &profile.clock)?;
     let recording = &recordings[0];
-    let mapping = Mapping::choose(recording, profile)?;
+    let (mapping, open_question) = match Mapping::choose(recording, profile) {
+        Ok(mapping) => (mapping, None),
+        Err(error) => (Mapping::default(), Some(error)),
+    };
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for (id, count) in &recording.log.counts {
         *counts.entry(&recording.log.channels[id].topic).or_default() += count;
@@ -88,6 +96,7 @@ pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
         messages: recording.log.message_count(),
         topics,
         mapping,
+        open_question,
         damage: recording.log.damage.clone(),
         transforms: recording.transforms.links(),
     })
@@ -144,6 +153,9 @@ impl fmt::Display for LogReport {
             )?;
         }
         writeln!(f)?;
+        if self.open_question.is_some() {
+            return Ok(());
+        }
         let mut missing = |signal: &str, present: bool, consequence: &str| match present {
             true => Ok(()),
             false => writeln!(f, "no {signal}: {consequence}"),

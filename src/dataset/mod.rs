@@ -1,18 +1,28 @@
 //! Logs in, batches out.
 //!
 //! ```text
-//! samples -> ego (pose, velocity) -> future, route, control   labels
+//! samples -> motion -> ego (pose, velocity) -> future, route, control, conditions   labels
+//!            odometry, /tf, dead_reckoning, gnss (geodesy, heading); world, base_frame
 //!         -> align (grid) -> drive (frames: picture, ralidar) -> columns -> shard
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! ingest: one log after the other, each committed alone; split, manifest, episodes, summary, inspect
 //! open (which frames train, which judge) -> order -> sample -> batch, by loader
 //! ```
 
-pub mod dead_reckoning;
 pub mod ego;
+pub mod world;
+pub mod base_frame;
+pub mod dead_reckoning;
+pub mod geodesy;
+pub mod heading;
+pub mod gnss;
+pub mod velocity;
+pub mod motion;
 pub mod future;
 pub mod route;
 pub mod control;
+pub mod conditions;
+pub mod radar;
 pub mod ralidar;
 pub mod picture;
 pub mod align;

@@ -4,12 +4,13 @@ use glam::DVec3;
 use half::f16;
 
 use crate::{
+    dataset::radar,
     error::Result,
     frame::{LidarPixels, RadarPixels},
     log::{
-        cloud::{Cloud, CloudPoint},
-        mapping::RADIAL_SPEED_FIELDS,
-        signals::{self, Kind, Pose, RadarReturn},
+        cloud::Cloud,
+        conventions::RadarRule,
+        signals::{Kind, Pose},
         value::Struct,
     },
     projection::Camera,
@@ -49,52 +50,36 @@ pub fn lidar_pixels(
     Ok(pixels)
 }
 
-/// Radar returns of a scan, a list of tracks or a cloud on the picture.
+/// Radar returns of a scan, a list of tracks or a cloud on the picture. Returns without a finite
+/// speed, of a radar that measures speeds, are none.
 ///
 /// # Errors
 ///
-/// As [`lidar_pixels`]; also if a cloud has no radial speed.
+/// As [`lidar_pixels`]; also if a cloud has neither x, y, z nor range, azimuth and elevation.
 pub fn radar_pixels(
     kind: Kind,
     message: &Struct,
+    rule: &RadarRule,
     camera_from_sensor: &Pose,
     camera: &Camera,
 ) -> Result<RadarPixels> {
-    let returns = match kind {
-        Kind::RadarScan => signals::radar_scan(message)?,
-        Kind::RadarTracks => signals::radar_tracks(message)?,
-        _ => radar_cloud(message)?,
-    };
+    let returns = radar::returns(kind, message, rule)?;
+    let has_speeds = returns.iter().any(|r| r.radial_speed_mps.is_some());
     let mut nearest = Nearest::new(camera);
     for r in returns {
-        nearest.add(camera_from_sensor.transform_point(r.position_m), r.radial_speed_mps);
+        let speed_mps = r.radial_speed_mps.unwrap_or(0.0);
+        if speed_mps.is_finite() {
+            nearest.add(camera_from_sensor.transform_point(r.position_m), speed_mps);
+        }
     }
-    let mut pixels = RadarPixels::default();
-    for (pixel, speed_mps) in nearest.finish() {
-        pixels.pixel.push(pixel);
-        pixels.speed_mps.push(f16::from_f64(speed_mps));
+    let (mut pixel, mut speed) = (Vec::new(), Vec::new());
+    for (at, speed_mps) in nearest.finish() {
+        pixel.push(at);
+        speed.push(f16::from_f64(speed_mps));
     }
-    Ok(pixels)
-}
-
-fn radar_cloud(message: &Struct) -> Result<Vec<RadarReturn>> {
-    let cloud = Cloud::new(message)?;
-    let [x, y, z] = cloud.xyz()?;
-    let speed = RADIAL_SPEED_FIELDS.iter().find_map(|name| cloud.field(name));
-    let Some(speed) = speed else {
-        return Err(crate::error::Error::Decode {
-            schema: message.name.to_string(),
-            offset: 0,
-            what: format!("no radial speed: none of {}", RADIAL_SPEED_FIELDS.join(", ")),
-        });
-    };
-    let returned = |point: CloudPoint| {
-        let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
-        let pose = &cloud.frame_from_points;
-        let position_m = pose.as_ref().map_or(point_m, |pose| pose.transform_point(point_m));
-        RadarReturn { position_m, radial_speed_mps: point.get(speed) }
-    };
-    Ok(cloud.points().map(returned).collect())
+    // An empty scan is one of a radar with speeds: nothing says that it has none.
+    let speed_mps = (has_speeds || pixel.is_empty()).then_some(speed);
+    Ok(RadarPixels { pixel, speed_mps })
 }
 
 /// The nearest return of each pixel.

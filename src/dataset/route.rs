@@ -3,8 +3,15 @@
 use glam::DVec3;
 
 use crate::{
-    dataset::ego::{EgoState, EgoTrack, wrap_angle},
+    dataset::{
+        ego::{EgoState, EgoTrack, wrap_angle},
+        motion::Motion,
+    },
     frame::{Command, ROUTE_POINTS, ROUTE_SPACING_M, Route, RouteSource},
+    log::{
+        recording::{Series, Stamped, Topic},
+        transforms::TransformTree,
+    },
 };
 
 /// Poses nearer than this to the last one kept add no path: a standing car's jitter is no way.
@@ -127,6 +134,31 @@ impl Path {
         }
         Route { waypoints_m, len: len as u8, source }
     }
+}
+
+/// Routes of a topic in the world of the ego motion, by the time from which they hold; and, if there
+/// are some that cannot be brought there, how many and why.
+pub fn planned(
+    topic: Option<&Topic>,
+    motion: &Motion,
+    transforms: &TransformTree,
+) -> (Vec<Stamped<Path>>, Option<String>) {
+    let Some((topic, Series::Path(paths))) = topic.map(|topic| (topic, &topic.series)) else {
+        return (Vec::new(), None);
+    };
+    let (mut planned, mut unplaced) = (Vec::new(), Vec::new());
+    let paths: Vec<_> = paths.iter().filter(|path| path.value.len() > 1).collect();
+    for path in &paths {
+        let stamp_ns = path.stamp_ns;
+        match motion.world_points(&path.value, &topic.frame_id, stamp_ns, transforms) {
+            Ok(points) => planned.push(Stamped { stamp_ns, value: Path::planned(&points) }),
+            Err(why) => unplaced.push(why),
+        }
+    }
+    let left_out = unplaced.first().map(|why| {
+        format!("route {}: {} of {} left out, {why}", topic.name, unplaced.len(), paths.len())
+    });
+    (planned, left_out)
 }
 
 /// The command that a route implies where no map tells of junctions: a turn is a bend of the

@@ -119,8 +119,11 @@ fn scatter(frame: &Frame, from: InputSize, to: InputSize) -> Result<Vec<f16>, St
             }
         }
     }
-    if let Some(radar) = &frame.radar {
-        for (&pixel, &speed) in radar.pixel.iter().zip(&radar.speed_mps) {
+    // Returns of a radar without speeds have nothing to say in the channel of speeds.
+    if let Some(radar) = &frame.radar
+        && let Some(speeds) = &radar.speed_mps
+    {
+        for (&pixel, &speed) in radar.pixel.iter().zip(speeds) {
             let at = 3 * area + target(pixel, "radar")?;
             if speed.to_f32().abs() > out[at].to_f32().abs() {
                 out[at] = speed;

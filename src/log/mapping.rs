@@ -1,29 +1,26 @@
-//! Which topic is which signal: by type, by name where a type has several, or as a profile says.
+//! Which topic is which signal: as a profile says, by the names of a known rig, or by type.
+//!
+//! Among topics that could all be a signal, names rank them where they say something plain (front
+//! before left). Where they do not, the choice is the user's: the error lists them and gives the
+//! flag that answers it.
 
 use crate::{
     error::Result,
     log::{
+        candidates::{self, BASE_FRAMES, Candidate},
         profile::Profile,
-        recording::{Recording, Series, Topic, mapping_error},
-        signals::Kind,
+        recording::{Recording, Topic, mapping_error},
+        rigs::Rig,
+        topics::{Names, matches},
     },
 };
 
-/// Cloud fields that hold a radial speed, and so make a cloud a radar's.
-pub const RADIAL_SPEED_FIELDS: [&str; 8] = [
-    "velocity",
-    "doppler",
-    "doppler_velocity",
-    "radial_velocity",
-    "radial_speed",
-    "range_rate",
-    "vr",
-    "v",
-];
-
 /// The chosen topics; names are keys of [`Recording::topics`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Mapping {
+    /// The rig that the log was recorded with, if it is a known one.
+    pub rig: Option<String>,
     pub camera: Option<String>,
     pub camera_info: Option<String>,
     pub lidar: Option<String>,
@@ -31,7 +28,11 @@ pub struct Mapping {
     pub pose: Option<PoseSource>,
     pub velocity: Option<String>,
     pub control: Option<String>,
+    /// Throttle and brake, where the control has none.
+    pub pedals: Option<String>,
     pub route: Option<String>,
+    pub weather: Option<String>,
+    pub town: Option<String>,
     /// Why a topic was chosen among several, and what is missing.
     pub notes: Vec<String>,
 }
@@ -46,6 +47,9 @@ pub enum PoseSource {
     Transform(String),
     /// Integrated from a velocity topic and a yaw rate (an IMU, or the same twist).
     Integrated { speed: String, yaw_rate: String },
+    /// Positions from satellites, headings from an IMU or from a twist that turns. Where there is
+    /// a speed, it carries the pose from one position to the next.
+    Gnss { fix: String, heading: String, speed: Option<String> },
 }
 
 impl Mapping {
@@ -54,33 +58,51 @@ impl Mapping {
     /// # Errors
     ///
     /// [`Error::Mapping`](crate::error::Error::Mapping) if a topic that the profile names is not
-    /// in the log or is of a type that cannot be that signal. A signal that is merely absent is
-    /// not an error here.
+    /// in the log or is of a type that cannot be that signal, or if several topics could be the
+    /// camera, the lidar, the radar or the pose and nothing says which. A signal that is merely
+    /// absent is not an error here.
     pub fn choose(recording: &Recording, profile: &Profile) -> Result<Mapping> {
-        let wanted = &profile.topics;
-        let mut chooser = Chooser { recording, ignore: &wanted.ignore, notes: Vec::new() };
-        let camera = chooser.topic("camera", &wanted.camera, &is_camera, &camera_rank)?;
-        let camera_info = match (&wanted.camera_info, &camera) {
-            (None, Some(camera)) => chooser.info_of(camera),
-            (named, _) => chooser.topic("camera_info", named, &is_info, &|_| 0)?,
+        let rig = match &profile.rig {
+            Some(name) => Rig::named(name),
+            None => {
+                let channels = recording.log.channels.values();
+                Rig::of_log(&channels.map(|channel| channel.topic.as_str()).collect::<Vec<_>>())
+            }
         };
-        let lidar = chooser.topic("lidar", &wanted.lidar, &is_lidar, &front_rank)?;
-        let radar = chooser.topic("radar", &wanted.radar, &is_radar, &front_rank)?;
-        let pose = chooser.pose(profile)?;
-        let velocity = chooser.topic("velocity", &wanted.velocity, &is_velocity, &|_| 0)?;
-        let control = chooser.topic("control", &wanted.control, &is_control, &control_rank)?;
-        let route = chooser.topic("route", &wanted.route, &is_route, &|_| 0)?;
-        let notes = chooser.notes;
-        Ok(Mapping { camera, camera_info, lidar, radar, pose, velocity, control, route, notes })
+        let mut notes = Vec::new();
+        if let Some(rig) = rig.as_ref().filter(|_| profile.rig.is_none()) {
+            notes.push(format!("rig: {} ({}), by its topics", rig.name, rig.about));
+        }
+        let rig_name = rig.as_ref().map(|rig| rig.name.to_string());
+        let mut chooser = Chooser { recording, profile, rig, notes };
+        let camera = chooser.topic(&candidates::CAMERA)?;
+        let camera_info = match (&profile.topics.camera_info, &camera) {
+            (None, Some(camera)) => chooser.info_of(camera)?,
+            _ => chooser.topic(&candidates::CAMERA_INFO)?,
+        };
+        Ok(Mapping {
+            rig: rig_name,
+            camera,
+            camera_info,
+            lidar: chooser.topic(&candidates::LIDAR)?,
+            radar: chooser.topic(&candidates::RADAR)?,
+            pose: chooser.pose()?,
+            velocity: chooser.topic(&candidates::VELOCITY)?,
+            control: chooser.topic(&candidates::CONTROL)?,
+            pedals: chooser.topic(&candidates::PEDALS)?,
+            route: chooser.topic(&candidates::ROUTE)?,
+            weather: chooser.topic(&candidates::WEATHER)?,
+            town: chooser.topic(&candidates::TOWN)?,
+            notes: chooser.notes,
+        })
     }
-}
 
-impl Mapping {
     /// What a topic is used as, for people.
     pub fn uses(&self, topic: &str) -> Option<String> {
-        let (pose, speed, yaw_rate) = match self.pose.clone() {
+        let (pose, speed, heading) = match self.pose.clone() {
             Some(PoseSource::Topic(topic)) => (Some(topic), None, None),
             Some(PoseSource::Integrated { speed, yaw_rate }) => (None, Some(speed), Some(yaw_rate)),
+            Some(PoseSource::Gnss { fix, heading, speed }) => (Some(fix), speed, Some(heading)),
             Some(PoseSource::Transform(_)) | None => (None, None, None),
         };
         let uses = [
@@ -90,10 +112,13 @@ impl Mapping {
             ("radar", &self.radar),
             ("ego pose", &pose),
             ("ego pose (speed)", &speed),
-            ("ego pose (yaw rate)", &yaw_rate),
+            ("ego pose (yaw rate)", &heading),
             ("velocity, where the pose has none", &self.velocity),
             ("control", &self.control),
+            ("pedals", &self.pedals),
             ("route", &self.route),
+            ("weather", &self.weather),
+            ("town", &self.town),
         ];
         let named: Vec<_> = uses
             .into_iter()
@@ -106,187 +131,203 @@ impl Mapping {
 
 struct Chooser<'r> {
     recording: &'r Recording,
-    ignore: &'r [String],
+    profile: &'r Profile,
+    rig: Option<Rig>,
     notes: Vec<String>,
 }
 
-impl Chooser<'_> {
-    /// The named topic, or the one of the lowest rank among those that fit.
-    fn topic(
-        &mut self,
-        signal: &str,
-        named: &Option<String>,
-        fits: &dyn Fn(&Topic) -> bool,
-        rank: &dyn Fn(&Topic) -> u32,
-    ) -> Result<Option<String>> {
-        let topics = &self.recording.topics;
-        let ignore = self.ignore;
-        let candidates = || {
-            let usable = topics.values().filter(|t| !t.series.is_empty() && fits(t));
-            usable.filter(|t| !ignore.contains(&t.name))
-        };
-        if let Some(name) = named {
-            if candidates().any(|topic| topic.name == *name) {
-                return Ok(Some(name.clone()));
-            }
-            let have: Vec<_> = candidates().map(|topic| topic.name.as_str()).collect();
-            let have = if have.is_empty() { "none".to_string() } else { have.join(", ") };
-            let unused = self.recording.unused.iter().find(|unused| unused.topic == *name);
-            let why = unused.map_or("it is not in the log, or empty".to_string(), |unused| {
-                format!("{}: {}", unused.type_name, unused.why)
-            });
-            let what = format!("topic `{name}` cannot be the {signal} ({why})");
-            let hint = format!("topics that could be the {signal}: {have}");
-            return Err(mapping_error(&self.recording.log, what, &hint));
-        }
-        let mut ranked: Vec<_> = candidates().map(|topic| (rank(topic), &topic.name)).collect();
-        ranked.sort();
-        if let [(_, best), others @ ..] = ranked.as_slice()
-            && !others.is_empty()
-        {
-            let others: Vec<_> = others.iter().map(|(_, name)| name.as_str()).collect();
-            self.notes.push(format!("{signal}: {best} taken, not {}", others.join(", ")));
-        }
-        Ok(ranked.first().map(|(_, name)| (*name).clone()))
+impl<'r> Chooser<'r> {
+    /// Topics of the log that could be a signal.
+    fn fitting(&self, candidate: &Candidate) -> Vec<&'r Topic> {
+        let ignored = &self.profile.topics.ignore;
+        let topics = self.recording.topics.values().filter(|topic| !topic.series.is_empty());
+        topics
+            .filter(|topic| !ignored.contains(&topic.name))
+            .filter(|topic| (candidate.fits)(topic, self.recording))
+            .collect()
     }
 
-    /// The calibration of a camera: the one of its frame, or the one that lies nearest by name.
-    fn info_of(&mut self, camera: &str) -> Option<String> {
-        let infos =
-            || self.recording.topics.values().filter(|t| is_info(t) && !t.series.is_empty());
-        let frame = &self.recording.topics.get(camera)?.frame_id;
+    /// The topic of a signal: the one that the profile names, else the one that the rig names,
+    /// else the one that ranks first by type and name.
+    fn topic(&mut self, candidate: &Candidate) -> Result<Option<String>> {
+        let fitting = self.fitting(candidate);
+        if let Some(names) = (candidate.named)(&self.profile.topics) {
+            let Some(named) = of_names(&fitting, names) else {
+                return Err(self.not_there(candidate.signal, names, &fitting));
+            };
+            return self.best_of(candidate, &named);
+        }
+        if let Some(rig) = &self.rig
+            && let Some(names) = (candidate.named)(&rig.topics)
+        {
+            if let Some(named) = of_names(&fitting, names) {
+                return self.best_of(candidate, &named);
+            }
+            if !fitting.is_empty() {
+                self.notes.push(format!(
+                    "{}: found by type; {} would have {names}",
+                    candidate.signal, rig.name
+                ));
+            }
+        }
+        self.best_of(candidate, &fitting)
+    }
+
+    /// The topic of the lowest rank.
+    fn best_of(&mut self, candidate: &Candidate, topics: &[&Topic]) -> Result<Option<String>> {
+        let mut ranked: Vec<_> = topics.iter().map(|t| ((candidate.rank)(t), *t)).collect();
+        ranked.sort_by_key(|(rank, topic)| (*rank, &topic.name));
+        let Some((best_rank, best)) = ranked.first().copied() else { return Ok(None) };
+        let equals: Vec<&Topic> =
+            ranked.iter().filter(|(rank, _)| *rank == best_rank).map(|(_, topic)| *topic).collect();
+        if (candidate.is_question)(&equals) {
+            return Err(self.question(candidate.signal, &equals));
+        }
+        if ranked.len() > 1 {
+            let others: Vec<_> = ranked[1..].iter().map(|(_, t)| t.name.as_str()).collect();
+            let (signal, others) = (candidate.signal, others.join(", "));
+            let note = format!("{signal}: {} taken, not {others}", best.name);
+            // A velocity may be asked for more than once.
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+        Ok(Some(best.name.clone()))
+    }
+
+    /// A topic that the user named cannot be the signal.
+    fn not_there(&self, signal: &str, names: &Names, fitting: &[&Topic]) -> crate::error::Error {
+        let have: Vec<_> = fitting.iter().map(|topic| topic.name.as_str()).collect();
+        let have = if have.is_empty() { "none".to_string() } else { have.join(", ") };
+        let unused = &self.recording.unused;
+        let unused = unused.iter().find(|unused| names.iter().any(|name| name == unused.topic));
+        let why = unused.map_or("it is not in the log, or empty".to_string(), |unused| {
+            format!("{}: {}", unused.type_name, unused.why)
+        });
+        let what = format!("topic `{names}` cannot be the {signal} ({why})");
+        let hint = format!("topics that could be the {signal}: {have}");
+        mapping_error(&self.recording.log, what, &hint)
+    }
+
+    /// Which of several topics it is, nothing says.
+    fn question(&self, signal: &str, topics: &[&Topic]) -> crate::error::Error {
+        let listed = topics.iter().map(|topic| match topic.frame_id.as_str() {
+            "" => topic.name.clone(),
+            frame => format!("{} (frame {frame})", topic.name),
+        });
+        let listed: Vec<_> = listed.collect();
+        let what = format!("{} topics could be the {signal}: {}", listed.len(), listed.join(", "));
+        let hint = format!(
+            "say which: --topic {signal}={}, or `{signal}` in the [topics] of a profile",
+            topics[0].name
+        );
+        mapping_error(&self.recording.log, what, &hint)
+    }
+
+    /// The calibration of a camera: the one that the rig names, the one of its frame, or the one
+    /// that lies nearest by name.
+    fn info_of(&mut self, camera: &str) -> Result<Option<String>> {
+        let infos = self.fitting(&candidates::CAMERA_INFO);
+        let Some(camera_topic) = self.recording.topics.get(camera) else { return Ok(None) };
+        let frame = &camera_topic.frame_id;
         let shared =
             |name: &str| name.bytes().zip(camera.bytes()).take_while(|(a, b)| a == b).count();
-        let best = infos().max_by_key(|info| (info.frame_id == *frame, shared(&info.name)))?;
+        let nearest = |info: &&&Topic| (info.frame_id == *frame, shared(&info.name));
+        let Some(best) = infos.iter().max_by_key(nearest) else { return Ok(None) };
         let namespace = camera.rfind('/').map_or("", |at| &camera[..at]);
         if best.frame_id != *frame && !best.name.starts_with(namespace) {
             self.notes.push(format!("camera_info: none belongs to {camera}"));
-            return None;
+            return Ok(None);
         }
-        Some(best.name.clone())
+        Ok(Some(best.name.clone()))
     }
 
-    fn pose(&mut self, profile: &Profile) -> Result<Option<PoseSource>> {
-        let named = profile.topics.odometry.clone().or_else(|| profile.topics.pose.clone());
-        if let Some(topic) = self.topic("pose", &named, &is_pose, &pose_rank)? {
-            return Ok(Some(PoseSource::Topic(topic)));
+    /// The ego pose, from the best that there is: odometry, a pose, `/tf`, a speed and a yaw rate,
+    /// positions from satellites. What the user names comes before all of them.
+    fn pose(&mut self) -> Result<Option<PoseSource>> {
+        let wanted = &self.profile.topics;
+        let is_gnss_wanted =
+            wanted.gnss.is_some() && wanted.odometry.is_none() && wanted.pose.is_none();
+        if is_gnss_wanted && let Some(gnss) = self.gnss()? {
+            return Ok(Some(gnss));
         }
-        let frames = ["base_link", "ego_vehicle", "base_footprint", "vehicle"];
-        let frame = frames.into_iter().find(|f| self.recording.transforms.track(f).is_some());
-        if let Some(frame) = frame {
+        let poses = [&candidates::ODOMETRY, &candidates::POSE];
+        let is_named = |candidate: &&&Candidate| (candidate.named)(wanted).is_some();
+        let named = poses.iter().filter(is_named);
+        let unnamed = poses.iter().filter(|candidate| !is_named(candidate));
+        for candidate in named.chain(unnamed) {
+            if let Some(topic) = self.topic(candidate)? {
+                return Ok(Some(PoseSource::Topic(topic)));
+            }
+        }
+        self.note_own_frame_poses();
+        if let Some(frame) = self.moving_frame() {
             self.notes.push(format!("pose: no odometry, so it is taken from /tf of `{frame}`"));
-            return Ok(Some(PoseSource::Transform(frame.to_string())));
+            return Ok(Some(PoseSource::Transform(frame)));
         }
-        let speed = self.topic("speed", &profile.topics.velocity, &is_velocity, &|_| 0)?;
-        let yaw_rate = self.topic("yaw rate", &None, &is_yaw_rate, &yaw_rate_rank)?;
-        let Some((speed, yaw_rate)) = speed.zip(yaw_rate) else { return Ok(None) };
+        let speed = self.topic(&candidates::VELOCITY)?;
+        let yaw_rate = self.topic(&candidates::YAW_RATE)?;
+        if let Some((speed, yaw_rate)) = speed.zip(yaw_rate) {
+            self.notes.push(format!(
+                "pose: none in the log, so it is integrated from {speed} and {yaw_rate}; the \
+                 world frame is the car's own"
+            ));
+            return Ok(Some(PoseSource::Integrated { speed, yaw_rate }));
+        }
+        self.gnss()
+    }
+
+    fn gnss(&mut self) -> Result<Option<PoseSource>> {
+        let fix = self.topic(&candidates::GNSS)?;
+        let heading = self.topic(&candidates::YAW_RATE)?;
+        let Some((fix, heading)) = fix.zip(heading) else { return Ok(None) };
+        let speed = self.topic(&candidates::VELOCITY)?;
         self.notes.push(format!(
-            "pose: none in the log, so it is integrated from {speed} and {yaw_rate}; the world \
-             frame is the car's own"
+            "pose: from the positions of {fix} and the headings of {heading}; the world is the \
+             plane that touches the earth at the first fix, x east, y north"
         ));
-        Ok(Some(PoseSource::Integrated { speed, yaw_rate }))
+        Ok(Some(PoseSource::Gnss { fix, heading, speed }))
     }
-}
 
-fn is_camera(topic: &Topic) -> bool {
-    let name = topic.name.to_ascii_lowercase();
-    // Pictures that are no photographs: they have the type of a camera and not its content.
-    let other = ["depth", "semantic", "segmentation", "instance", "optical_flow", "dvs"];
-    matches!(topic.kind, Kind::CompressedImage | Kind::Image)
-        && !other.iter().any(|word| name.contains(word))
-}
-
-fn is_info(topic: &Topic) -> bool {
-    topic.kind == Kind::CameraInfo
-}
-
-fn has_radial_speed(topic: &Topic) -> bool {
-    let is_speed =
-        |field: &String| RADIAL_SPEED_FIELDS.iter().any(|name| field.eq_ignore_ascii_case(name));
-    topic.cloud_fields.iter().any(is_speed)
-}
-
-fn is_radar(topic: &Topic) -> bool {
-    let named = topic.name.to_ascii_lowercase().contains("radar");
-    match topic.kind {
-        Kind::RadarScan | Kind::RadarTracks => true,
-        Kind::PointCloud => {
-            let lidar = topic.name.to_ascii_lowercase().contains("lidar");
-            has_radial_speed(topic) && (named || !lidar)
+    /// Say of poses of the car in its own frame that they are none.
+    fn note_own_frame_poses(&mut self) {
+        let is_own = |topic: &&Topic| candidates::is_own_frame_pose(topic, self.recording);
+        for topic in self.recording.topics.values().filter(is_own) {
+            self.notes.push(format!(
+                "pose: {} is told in the car's own frame (`{}`), so it is not how the car moves",
+                topic.name, topic.frame_id
+            ));
         }
-        _ => false,
+    }
+
+    /// The frame of the car, if `/tf` moves it.
+    fn moving_frame(&mut self) -> Option<String> {
+        let tree = &self.recording.transforms;
+        if let Some(base) = &self.profile.ego.base {
+            return tree.motion(base).map(|_| base.clone());
+        }
+        let named = BASE_FRAMES.into_iter().find(|frame| tree.motion(frame).is_some());
+        if let Some(frame) = named {
+            return Some(frame.to_string());
+        }
+        let moving: Vec<&str> = tree.moving().collect();
+        if let [only] = moving[..] {
+            return Some(only.to_string());
+        }
+        if !moving.is_empty() {
+            self.notes.push(format!(
+                "pose: none of the moving frames {} has the name of a car's (profile key ego.base)",
+                moving.join(", ")
+            ));
+        }
+        None
     }
 }
 
-fn is_lidar(topic: &Topic) -> bool {
-    let named_radar = topic.name.to_ascii_lowercase().contains("radar");
-    topic.kind == Kind::PointCloud && !is_radar(topic) && !named_radar
-}
-
-fn is_pose(topic: &Topic) -> bool {
-    // A goal is a pose that somebody wants, not one that the car had.
-    let is_goal = topic.name.to_ascii_lowercase().contains("goal");
-    matches!(topic.kind, Kind::Odometry | Kind::Pose) && !is_goal
-}
-
-fn is_velocity(topic: &Topic) -> bool {
-    matches!(topic.kind, Kind::Twist | Kind::CarlaStatus) && !is_command(topic)
-}
-
-/// An IMU, or a twist that turns at all.
-fn is_yaw_rate(topic: &Topic) -> bool {
-    match &topic.series {
-        Series::Imu(_) => true,
-        Series::Twist(samples) => !is_command(topic) && samples.iter().any(|s| s.value.1.z != 0.0),
-        _ => false,
-    }
-}
-
-fn yaw_rate_rank(topic: &Topic) -> u32 {
-    u32::from(topic.kind != Kind::Imu)
-}
-
-fn is_control(topic: &Topic) -> bool {
-    matches!(topic.kind, Kind::CarlaControl | Kind::CarlaStatus | Kind::Ackermann)
-}
-
-fn is_route(topic: &Topic) -> bool {
-    topic.kind == Kind::Path
-}
-
-/// A twist that says what was asked for, not what happened.
-fn is_command(topic: &Topic) -> bool {
-    let name = topic.name.to_ascii_lowercase();
-    topic.kind == Kind::Twist && ["cmd", "command", "target"].iter().any(|w| name.contains(w))
-}
-
-fn front_rank(topic: &Topic) -> u32 {
-    let name = topic.name.to_ascii_lowercase();
-    if name.contains("front") || name.contains("top") {
-        0
-    } else if ["left", "right", "rear", "back"].iter().any(|word| name.contains(word)) {
-        2
-    } else {
-        1
-    }
-}
-
-fn camera_rank(topic: &Topic) -> u32 {
-    // Of two pictures of one camera the compressed one costs less to read.
-    2 * front_rank(topic) + u32::from(topic.kind == Kind::Image)
-}
-
-fn pose_rank(topic: &Topic) -> u32 {
-    match topic.kind {
-        Kind::Odometry => 0,
-        _ => 1,
-    }
-}
-
-fn control_rank(topic: &Topic) -> u32 {
-    match topic.kind {
-        Kind::CarlaControl => 0,
-        Kind::CarlaStatus => 1,
-        _ => 2,
-    }
+/// Topics of the first of several names that is there.
+fn of_names<'r>(topics: &[&'r Topic], names: &Names) -> Option<Vec<&'r Topic>> {
+    names.iter().find_map(|name| {
+        let named: Vec<_> = topics.iter().filter(|t| matches(name, &t.name)).copied().collect();
+        (!named.is_empty()).then_some(named)
+    })
 }

@@ -4,7 +4,8 @@
 //! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples) -> scan (recordings)
 //!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
 //!           clock: which instant, jumps: where it goes back
-//!           mapping: which topic is which signal        transforms: where each sensor sits
+//!           rigs, profile -> mapping: which topic is which signal
+//!           transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
 //! ```
 //!
@@ -39,7 +40,11 @@ pub mod transforms;
 pub mod jumps;
 pub mod recording;
 pub mod scan;
+pub mod topics;
+pub mod conventions;
+pub mod rigs;
 pub mod profile;
+pub mod candidates;
 pub mod mapping;
 pub mod definitions;
 pub mod encode;

@@ -7,15 +7,14 @@ use serde::{Deserialize, Serialize};
 use crate::{
     error::{Error, Result},
     frame::{Conditions, IMAGE_HEIGHT, IMAGE_WIDTH},
-    log::clock::ClockRule,
+    log::{
+        clock::ClockRule,
+        conventions::{ControlRule, EgoRule, RadarRule},
+        rigs::Rig,
+        topics::Topics,
+    },
     projection::Crop,
 };
-
-/// Names of the built-in profiles, with what they are for.
-pub const BUILT_IN: [(&str, &str); 2] = [
-    ("auto", "topics are found by type, and by name where a type has several"),
-    ("carla-ros-bridge", "topics of CARLA's ROS bridge for the role name `ego_vehicle`"),
-];
 
 /// Front-wheel angle at full steering of an ordinary passenger car, rad (35 degrees). Used where
 /// a log has wheel angles and neither a normalised steering nor a configured lock.
@@ -25,35 +24,19 @@ pub const DEFAULT_STEERING_LOCK_RAD: f64 = 0.611;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Profile {
+    /// What the log was recorded with; `None`: recognised by its topics, if it is a known rig.
+    pub rig: Option<String>,
+    /// Topics that have to be there. Those of a rig need not.
     pub topics: Topics,
     pub clock: ClockRule,
     pub tolerance_ms: Tolerance,
     pub camera: CameraRule,
+    pub ego: EgoRule,
+    pub radar: RadarRule,
     pub control: ControlRule,
     pub required: Required,
     /// Conditions of the drive, where the log's metadata does not tell them.
     pub conditions: Conditions,
-}
-
-/// Topic names. What is not named is found by type.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Topics {
-    pub camera: Option<String>,
-    pub camera_info: Option<String>,
-    pub lidar: Option<String>,
-    pub radar: Option<String>,
-    /// Odometry: pose and velocity together.
-    pub odometry: Option<String>,
-    /// A pose, where there is no odometry.
-    pub pose: Option<String>,
-    /// A velocity, where the odometry has none.
-    pub velocity: Option<String>,
-    pub control: Option<String>,
-    /// A planned route.
-    pub route: Option<String>,
-    /// Topics to treat as if they were not in the log.
-    pub ignore: Vec<String>,
 }
 
 /// Furthest that a sample may be from its tick, milliseconds.
@@ -92,14 +75,6 @@ impl Default for CameraRule {
     }
 }
 
-/// How controls are read.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ControlRule {
-    /// Front-wheel angle at full steering, rad.
-    pub steering_lock_rad: Option<f64>,
-}
-
 /// Signals without which there is no frame, besides the camera and the ego motion.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -110,49 +85,59 @@ pub struct Required {
 }
 
 impl Profile {
-    /// A built-in profile by name, or one from a TOML file.
+    /// The profile of a rig by its name, `auto`, or one from a TOML file.
     ///
     /// # Errors
     ///
     /// [`Error::Config`] if there is neither, the file is not a profile, or a value is out of
     /// range.
     pub fn load(name_or_path: &str) -> Result<Profile> {
-        let profile = match name_or_path {
-            "auto" => Profile::default(),
-            "carla-ros-bridge" => Profile { topics: carla_ros_bridge(), ..Profile::default() },
-            path if Path::new(path).extension().is_some_and(|e| e == "toml") => {
-                let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
-                toml::from_str(&text).map_err(|error| Error::Config {
-                    key: path.to_string(),
-                    what: error.to_string(),
-                    hint: None,
-                })?
-            }
-            other => {
-                let names: Vec<_> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-                return Err(Error::Config {
-                    key: "--profile".into(),
-                    what: format!("`{other}` is not a profile"),
-                    hint: Some(format!(
-                        "built-in profiles are {}; a profile of your own is a FILE.toml",
-                        names.join(", ")
-                    )),
-                });
-            }
+        let is_file = Path::new(name_or_path).extension().is_some_and(|e| e == "toml");
+        let profile = if is_file {
+            let text =
+                std::fs::read_to_string(name_or_path).map_err(Error::io("read", name_or_path))?;
+            toml::from_str(&text).map_err(|error| Error::Config {
+                key: name_or_path.to_string(),
+                what: error.to_string(),
+                hint: None,
+            })?
+        } else {
+            let rig = Some(name_or_path.to_string()).filter(|name| name != "auto");
+            Profile { rig, ..Profile::default() }
         };
-        profile.check()?;
+        profile.check(if is_file { "rig" } else { "--profile" })?;
         Ok(profile)
     }
 
-    /// Make sure that all values are within their ranges.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Config`] names the value that is not.
-    pub fn check(&self) -> Result<()> {
+    /// The profile with what a rig knows in the place of what it leaves open, except topics.
+    pub fn on(&self, rig: Option<&Rig>) -> Profile {
+        let mut profile = self.clone();
+        if let Some(rig) = rig {
+            profile.ego.world = self.ego.world.or(rig.ego.world);
+            profile.ego.base = self.ego.base.clone().or_else(|| rig.ego.base.clone());
+            profile.radar.azimuth = self.radar.azimuth.or(rig.radar.azimuth);
+            profile.radar.closing_speed = self.radar.closing_speed.or(rig.radar.closing_speed);
+            let lock = self.control.steering_lock_rad.or(rig.control.steering_lock_rad);
+            profile.control.steering_lock_rad = lock;
+        }
+        profile
+    }
+
+    fn check(&self, rig_key: &str) -> Result<()> {
         self.clock.check()?;
         let fail =
             |key: &str, what: String| Err(Error::Config { key: key.to_string(), what, hint: None });
+        if let Some(rig) = self.rig.as_deref().filter(|rig| Rig::names().all(|name| name != *rig)) {
+            let names: Vec<_> = Rig::names().collect();
+            return Err(Error::Config {
+                key: rig_key.into(),
+                what: format!("`{rig}` is not a profile"),
+                hint: Some(format!(
+                    "built-in profiles are auto, {}; a profile of your own is a FILE.toml",
+                    names.join(", ")
+                )),
+            });
+        }
         let t = &self.tolerance_ms;
         let tolerances = BTreeMap::from([
             ("tolerance_ms.camera", t.camera),
@@ -180,19 +165,5 @@ impl Profile {
             }
             _ => Ok(()),
         }
-    }
-}
-
-fn carla_ros_bridge() -> Topics {
-    let topic = |name: &str| Some(format!("/carla/ego_vehicle/{name}"));
-    Topics {
-        camera: topic("rgb_front/image"),
-        camera_info: topic("rgb_front/camera_info"),
-        lidar: topic("lidar"),
-        radar: topic("radar_front"),
-        odometry: topic("odometry"),
-        control: topic("vehicle_control_cmd"),
-        route: topic("waypoints"),
-        ..Topics::default()
     }
 }

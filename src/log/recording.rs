@@ -16,7 +16,9 @@ use crate::{
         decoder::Decoder,
         jumps::{Course, JUMP_NS},
         reader::{Channel, Log, Message, Place},
-        signals::{self, CarlaStatus, Control, Header, Kind, Odometry, Pose},
+        signals::{
+            self, CarlaStatus, Control, Fix, Header, Inertial, Kind, Odometry, Pose, Weather,
+        },
         transforms::TransformTree,
         value::Struct,
     },
@@ -40,11 +42,13 @@ pub enum Series {
     Pose(Vec<Stamped<Pose>>),
     /// Linear and angular velocity.
     Twist(Vec<Stamped<(DVec3, DVec3)>>),
-    /// Angular velocity.
-    Imu(Vec<Stamped<DVec3>>),
+    Imu(Vec<Stamped<Inertial>>),
+    Fix(Vec<Stamped<Fix>>),
     Control(Vec<Stamped<Control>>),
     Status(Vec<Stamped<CarlaStatus>>),
     Path(Vec<Stamped<Vec<DVec3>>>),
+    Weather(Vec<Stamped<Weather>>),
+    Town(Vec<Stamped<String>>),
 }
 
 /// A topic that pmp can use.
@@ -161,7 +165,12 @@ impl Topic {
             Kind::Pose => Series::Pose(Vec::new()),
             Kind::Twist => Series::Twist(Vec::new()),
             Kind::Imu => Series::Imu(Vec::new()),
-            Kind::Ackermann | Kind::CarlaControl => Series::Control(Vec::new()),
+            Kind::Fix => Series::Fix(Vec::new()),
+            Kind::Ackermann | Kind::CarlaControl | Kind::Steering | Kind::Actuation => {
+                Series::Control(Vec::new())
+            }
+            Kind::Weather => Series::Weather(Vec::new()),
+            Kind::WorldInfo => Series::Town(Vec::new()),
             Kind::CarlaStatus => Series::Status(Vec::new()),
             Kind::Path => Series::Path(Vec::new()),
             // Transforms go to the tree; the series stays empty.
@@ -264,12 +273,17 @@ impl Topic {
                 samples.push(Stamped { stamp_ns, value: signals::stamped_twist(&decode()?)? });
             }
             Series::Imu(samples) => {
-                samples.push(Stamped { stamp_ns, value: signals::angular_velocity(&decode()?)? });
+                samples.push(Stamped { stamp_ns, value: signals::inertial(&decode()?)? });
+            }
+            Series::Fix(samples) => {
+                samples.push(Stamped { stamp_ns, value: signals::fix(&decode()?)? });
             }
             Series::Control(samples) => {
                 let message = decode()?;
                 let value = match self.kind {
                     Kind::Ackermann => signals::ackermann(&message)?,
+                    Kind::Steering => signals::steering_report(&message)?,
+                    Kind::Actuation => signals::actuation(&message)?,
                     _ => signals::carla_control(&message)?,
                 };
                 samples.push(Stamped { stamp_ns, value });
@@ -279,6 +293,12 @@ impl Topic {
             }
             Series::Path(samples) => {
                 samples.push(Stamped { stamp_ns, value: signals::path(&decode()?)? });
+            }
+            Series::Weather(samples) => {
+                samples.push(Stamped { stamp_ns, value: signals::carla_weather(&decode()?)? });
+            }
+            Series::Town(samples) => {
+                samples.push(Stamped { stamp_ns, value: signals::carla_town(&decode()?)? });
             }
         }
         Ok(())
@@ -359,6 +379,9 @@ macro_rules! with_samples {
             Series::Control($samples) => $body,
             Series::Status($samples) => $body,
             Series::Path($samples) => $body,
+            Series::Fix($samples) => $body,
+            Series::Weather($samples) => $body,
+            Series::Town($samples) => $body,
         }
     };
 }
@@ -439,6 +462,9 @@ impl Series {
             Series::Control(samples) => Series::Control(samples.split_off(at)),
             Series::Status(samples) => Series::Status(samples.split_off(at)),
             Series::Path(samples) => Series::Path(samples.split_off(at)),
+            Series::Fix(samples) => Series::Fix(samples.split_off(at)),
+            Series::Weather(samples) => Series::Weather(samples.split_off(at)),
+            Series::Town(samples) => Series::Town(samples.split_off(at)),
         }
     }
 }

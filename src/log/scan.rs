@@ -126,7 +126,10 @@ impl<'c> Builder<'c> {
             }
             return Ok(());
         }
-        let header = decoder.header(message.data)?;
+        let header = match topic.kind.has_header() {
+            true => decoder.header(message.data)?,
+            false => Header { stamp_ns: 0, frame_id: String::new() },
+        };
         if topic.series.is_empty() {
             topic.describe(message, &header)?;
         }

@@ -9,6 +9,11 @@ use crate::log::signals::{Header, Pose};
 /// Longest step between two dynamic transforms that is interpolated across.
 const MAX_GAP_NS: i64 = 500_000_000;
 
+/// Changes below these are no motion: simulators compute mounts anew from world coordinates, and
+/// what they round differs from message to message.
+const STILL_M: f64 = 1e-3;
+const STILL_RAD: f64 = 1e-4;
+
 /// Longest chain of frames that is followed: a loop in the tree must not hang us.
 const MAX_CHAIN: usize = 64;
 
@@ -34,6 +39,12 @@ impl Pose {
         Pose { position_m: rotation * -self.position_m, rotation }
     }
 
+    /// Whether two poses differ by no more than rounding.
+    fn is_near(&self, other: &Pose) -> bool {
+        self.position_m.distance(other.position_m) <= STILL_M
+            && self.rotation.angle_between(other.rotation) <= STILL_RAD
+    }
+
     /// Between two poses: straight for the position, the shorter way round for the rotation.
     pub fn interpolate(&self, other: &Pose, fraction: f64) -> Pose {
         Pose {
@@ -50,7 +61,7 @@ struct Link {
     /// `parent_from_child` by stamp.
     poses: Vec<(i64, Pose)>,
     is_static: bool,
-    /// All poses are the same: a mount that was told again and again, or once, on a topic that
+    /// All poses are the same but for rounding: a mount that was told again and again, or once, on a topic that
     /// does not say that it is static. It holds at all times.
     is_fixed: bool,
 }
@@ -144,10 +155,52 @@ impl TransformTree {
         self.links.iter().map(|(child, link)| format!("{} -> {child}", link.parent)).collect()
     }
 
-    /// Poses of one dynamic frame in its parent, with the parent's name.
-    pub fn track(&self, child: &str) -> Option<(&str, &[(i64, Pose)])> {
-        let link = self.links.get(child).filter(|link| !link.is_static)?;
-        Some((&link.parent, &link.poses))
+    /// Whether a frame is in the tree, as child or as parent.
+    pub fn has(&self, frame: &str) -> bool {
+        self.links.contains_key(frame) || self.links.values().any(|link| link.parent == frame)
+    }
+
+    /// Frames whose own link changes over time.
+    pub fn moving(&self) -> impl Iterator<Item = &str> {
+        let moving = self.links.iter().filter(|(_, link)| !link.is_static && !link.is_fixed);
+        moving.map(|(child, _)| child.as_str())
+    }
+
+    /// Motion of a frame in the highest frame above it to which `/tf` leads at nine in ten of its
+    /// stamps (the others are left out): that frame's name and the poses in it, by stamp. The
+    /// stamps are those of the nearest link that moves. `None` if no link on the way is dynamic.
+    pub fn motion<'a>(&'a self, frame: &str) -> Option<(&'a str, Vec<(i64, Pose)>)> {
+        let dynamic = self.ancestry(frame).filter(|link| !link.is_static);
+        let nearest = dynamic.min_by_key(|link| link.is_fixed)?;
+        let mut stamps: Vec<i64> = nearest.poses.iter().map(|(stamp_ns, _)| *stamp_ns).collect();
+        stamps.dedup();
+        let worlds: Vec<&str> = self.ancestry(frame).map(|link| link.parent.as_str()).collect();
+        worlds.into_iter().rev().find_map(|world| {
+            let poses = stamps.iter().filter_map(|stamp_ns| {
+                Some((*stamp_ns, self.lookup(world, frame, *stamp_ns).ok()?))
+            });
+            let poses: Vec<_> = poses.collect();
+            (10 * poses.len() >= 9 * stamps.len()).then_some((world, poses))
+        })
+    }
+
+    /// `target_from_source` of two frames that do not move against one another.
+    pub fn rigid(&self, target: &str, source: &str) -> Option<Pose> {
+        let rigid_part = |start| {
+            let rigid = |link: &&Link| link.is_static || link.is_fixed;
+            let rigid = self.ancestry(start).take_while(rigid);
+            std::iter::once(start).chain(rigid.map(|link| link.parent.as_str())).collect::<Vec<_>>()
+        };
+        let (from_target, from_source) = (rigid_part(target), rigid_part(source));
+        let meet = from_target.iter().any(|frame| from_source.contains(frame));
+        // What does not move is the same at any time.
+        meet.then(|| self.lookup(target, source, 0).ok()).flatten()
+    }
+
+    /// Links from a frame upwards.
+    fn ancestry<'a>(&'a self, start: &str) -> impl Iterator<Item = &'a Link> + use<'a> {
+        std::iter::successors(self.links.get(start), |link| self.links.get(&link.parent))
+            .take(MAX_CHAIN)
     }
 
     /// The frame and all above it, each with `frame_from_start`.
@@ -167,7 +220,7 @@ impl TransformTree {
 
 impl Link {
     fn has_one_pose(&self) -> bool {
-        self.poses.windows(2).all(|pair| pair[0].1 == pair[1].1)
+        self.poses.iter().all(|(_, pose)| self.poses[0].1.is_near(pose))
     }
 
     fn at(&self, stamp_ns: i64) -> Option<Pose> {

@@ -22,6 +22,7 @@ use pmp::{
     log::{
         cdr,
         clock::ClockRule,
+        conventions::RadarRule,
         decoder::Decoder,
         profile::{Profile, Required, Tolerance},
         reader::{Channel, Place},
@@ -407,7 +408,7 @@ fn controls(kind: Kind, samples: &[Control], profile: &Profile, track: &EgoTrack
     let decoder = Arc::new(Decoder::Cdr(Schema { types: Vec::new() }));
     let mut topic = Topic::new(kind, channel, decoder, &ClockRule::default());
     topic.series = Series::Control(stamped);
-    Controls::new(Some(&topic), None, profile, track)
+    Controls::new(Some(&topic), None, None, profile, track)
 }
 
 fn pedals(steer: f64, throttle: f64, brake: f64) -> Control {
@@ -603,9 +604,10 @@ fn radar_returns_are_projected_by_range_azimuth_and_elevation() {
     let optical =
         Pose { position_m: DVec3::ZERO, rotation: glam::DQuat::from_xyzw(0.5, -0.5, 0.5, 0.5) };
     let camera = Camera::from_fov(600, 250, FRAC_PI_2);
-    let pixels = radar_pixels(Kind::RadarScan, &value, &optical, &camera).unwrap();
+    let pixels =
+        radar_pixels(Kind::RadarScan, &value, &RadarRule::default(), &optical, &camera).unwrap();
     // u = 300 - 300 tan(azimuth), v = 125 - 300 tan(elevation) / cos(azimuth).
     assert_eq!(pixels.pixel, [94 * 600 + 239, 124 * 600 + 392]);
-    let speeds: Vec<f32> = pixels.speed_mps.iter().map(|speed| speed.to_f32()).collect();
+    let speeds: Vec<f32> = pixels.speed_mps.unwrap().iter().map(|speed| speed.to_f32()).collect();
     assert_eq!(speeds, [-3.5, 1.25]);
 }

@@ -35,6 +35,8 @@ const TYPES: &[(&str, &str)] = &[
     ("sensor_msgs/PointField", "uint8 INT8    = 1\nuint8 FLOAT32 = 7\nstring name\nuint32 offset\nuint8 datatype\nuint32 count"),
     ("sensor_msgs/PointCloud2", "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense"),
     ("sensor_msgs/Imu", "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance"),
+    ("sensor_msgs/NavSatStatus", "int8 STATUS_NO_FIX=-1\nint8 status\nuint16 service"),
+    ("sensor_msgs/NavSatFix", "std_msgs/Header header\nNavSatStatus status\nfloat64 latitude\nfloat64 longitude\nfloat64 altitude\nfloat64[9] position_covariance\nuint8 position_covariance_type"),
     ("unique_identifier_msgs/UUID", "uint8[16] uuid"),
     ("radar_msgs/RadarReturn", "float32 range\nfloat32 azimuth\nfloat32 elevation\nfloat32 doppler_velocity\nfloat32 amplitude"),
     ("radar_msgs/RadarScan", "std_msgs/Header header\nradar_msgs/RadarReturn[] returns"),
@@ -45,10 +47,16 @@ const TYPES: &[(&str, &str)] = &[
     ("ackermann_msgs/AckermannDriveStamped", "std_msgs/Header header\nAckermannDrive drive"),
     ("carla_msgs/CarlaEgoVehicleControl", "std_msgs/Header header\nfloat32 throttle\nfloat32 steer\nfloat32 brake\nbool hand_brake\nbool reverse\nint32 gear\nbool manual_gear_shift"),
     ("carla_msgs/CarlaEgoVehicleStatus", "std_msgs/Header header\nfloat32 velocity\ngeometry_msgs/Accel acceleration\ngeometry_msgs/Quaternion orientation\nCarlaEgoVehicleControl control"),
+    ("carla_msgs/CarlaWeatherParameters", "float32 cloudiness\nfloat32 precipitation\nfloat32 precipitation_deposits\nfloat32 wind_intensity\nfloat32 fog_density\nfloat32 fog_distance\nfloat32 wetness\nfloat32 sun_azimuth_angle\nfloat32 sun_altitude_angle"),
+    ("carla_msgs/CarlaWorldInfo", "string map_name\nstring opendrive"),
+    ("autoware_vehicle_msgs/VelocityReport", "std_msgs/Header header\nfloat32 longitudinal_velocity\nfloat32 lateral_velocity\nfloat32 heading_rate"),
+    ("autoware_vehicle_msgs/SteeringReport", "builtin_interfaces/Time stamp\nfloat32 steering_tire_angle"),
+    ("tier4_vehicle_msgs/ActuationStatus", "float64 accel_status\nfloat64 brake_status\nfloat64 steer_status"),
+    ("tier4_vehicle_msgs/ActuationStatusStamped", "std_msgs/Header header\nActuationStatus status"),
 ];
 
 /// Every type above that is a message of a topic that pmp reads.
-pub(crate) const TOPIC_TYPES: [&str; 18] = [
+pub(crate) const TOPIC_TYPES: [&str; 23] = [
     "sensor_msgs/CompressedImage",
     "sensor_msgs/Image",
     "sensor_msgs/CameraInfo",
@@ -66,6 +74,11 @@ pub(crate) const TOPIC_TYPES: [&str; 18] = [
     "ackermann_msgs/AckermannDriveStamped",
     "carla_msgs/CarlaEgoVehicleControl",
     "carla_msgs/CarlaEgoVehicleStatus",
+    "sensor_msgs/NavSatFix",
+    "carla_msgs/CarlaWeatherParameters",
+    "carla_msgs/CarlaWorldInfo",
+    "autoware_vehicle_msgs/VelocityReport",
+    "tier4_vehicle_msgs/ActuationStatusStamped",
     "std_msgs/Header",
 ];
 

@@ -348,9 +348,9 @@ fn what_cannot_be_used_is_told_with_its_reason() {
         let header = MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
         writer.write_to_known_channel(&header, b"{}").unwrap();
     };
-    let fix = Form::Protobuf.schema("LocationFix").1;
+    let all = Form::Protobuf.schema("LocationFix").1;
     add("/a", None, "json");
-    add("/b", Some(("foxglove.LocationFix", "protobuf", &fix)), "protobuf");
+    add("/b", Some(("foxglove.Grid", "protobuf", &all)), "protobuf");
     add("/c", Some(("foxglove.RawImage", "protobuf", b"nonsense")), "protobuf");
     add("/d", Some(("foxglove.RawImage", "jsonschema", b"nonsense")), "json");
     add("/e", Some(("foxglove.RawImage", "protobuf", b"")), "protobuf");

@@ -148,7 +148,7 @@ fn a_made_drive_gives_the_frames_that_its_closed_form_says() {
         );
         let radar = frame.radar.as_ref().unwrap();
         assert_eq!(
-            (radar.pixel.as_slice(), radar.speed_mps[0].to_f32()),
+            (radar.pixel.as_slice(), radar.speed_mps.as_ref().unwrap()[0].to_f32()),
             ([121 * 600 + 376].as_slice(), -3.5)
         );
         assert_eq!((frame.skew.image_ns, frame.skew.control_ns), (0, Some(0)));
@@ -480,7 +480,7 @@ fn misuse_ends_in_2_and_bad_values_in_1_with_what_to_do() {
     fails(
         &[log, "--profile", "waymo"],
         "error: --profile: `waymo` is not a profile\n\nhint: built-in profiles are auto, \
-         carla-ros-bridge; a profile of your own is a FILE.toml\n",
+         carla-ros-bridge, nuscenes2mcap, kitti, autoware, pmp, comma; a profile of your own is a FILE.toml\n",
     );
     let empty = folder.path().join("empty");
     fs::create_dir(&empty).unwrap();

@@ -8,6 +8,7 @@ mod schemas;
 mod definitions;
 mod fixtures;
 mod foxglove_fixtures;
+mod rig_fixtures;
 mod decoding;
 mod ros1;
 mod idl;
@@ -23,6 +24,8 @@ mod writers;
 mod clocks;
 mod accounts;
 mod shares;
+mod rigs;
+mod conventions;
 mod real_drive;
 #[cfg(feature = "learning")]
 mod evaluation;

@@ -76,7 +76,8 @@ fn nearest_lidar_return_and_fastest_radar_return_win_a_pixel() {
         y: halves(&[-1.0, -2.0, -3.0]),
         z: halves(&[20.0, 10.0, 30.0]),
     });
-    frame.radar = Some(RadarPixels { pixel: vec![0, 1, 2], speed_mps: halves(&[2.0, -6.0, 5.0]) });
+    frame.radar =
+        Some(RadarPixels { pixel: vec![0, 1, 2], speed_mps: Some(halves(&[2.0, -6.0, 5.0])) });
     let sample = Sample::new(&frame, SIZE).unwrap();
     let pixel = |at: usize| -> Vec<f32> {
         (0..4).map(|channel| sample.ralidar[channel * 32 * 80 + at].to_f32()).collect()
@@ -126,7 +127,7 @@ fn picture_that_cannot_be_used_names_its_frame() {
     assert!(error.starts_with("picture of frame 7: "), "{error}");
 
     let mut outside = frame();
-    outside.radar = Some(RadarPixels { pixel: vec![250 * 600], speed_mps: halves(&[1.0]) });
+    outside.radar = Some(RadarPixels { pixel: vec![250 * 600], speed_mps: Some(halves(&[1.0])) });
     let error = Sample::new(&outside, SIZE).unwrap_err().to_string();
     assert_eq!(error, "picture of frame 7: radar pixel 150000 is outside of 600 x 250");
 }

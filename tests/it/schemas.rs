@@ -24,9 +24,11 @@ use pmp::{
     frame::Conditions,
     log::{
         clock::Clock,
+        conventions::{EgoRule, RadarRule, Side, Sign, World},
         mapping::{Mapping, PoseSource},
-        profile::{Profile, Topics},
+        profile::Profile,
         reader::Damage,
+        topics::{Names, Topics},
     },
     projection::{Camera, Crop, Distortion},
 };
@@ -100,20 +102,27 @@ fn manifest() -> Manifest {
         traffic: text("empty"),
     };
     let mut profile = Profile { conditions: conditions.clone(), ..Profile::default() };
+    let named = |name: &str| Some(Names::from(name));
     profile.topics = Topics {
-        camera: text("/camera"),
-        camera_info: text("/info"),
-        lidar: text("/lidar"),
-        radar: text("/radar"),
-        odometry: text("/odom"),
-        pose: text("/pose"),
-        velocity: text("/velocity"),
-        control: text("/control"),
-        route: text("/route"),
+        camera: named("/camera"),
+        camera_info: named("/info"),
+        lidar: named("/lidar"),
+        radar: named("/radar"),
+        odometry: named("/odom"),
+        pose: named("/pose"),
+        velocity: named("/velocity"),
+        imu: named("/imu"),
+        gnss: named("/gnss"),
+        control: named("/control"),
+        pedals: named("/pedals"),
+        route: named("/route"),
         ignore: vec!["/other".into()],
     };
     profile.clock.topics = BTreeMap::from([("/camera".into(), Clock::Log)]);
     profile.clock.offset_s = BTreeMap::from([("/gps".into(), -66.14)]);
+    profile.rig = text("kitti");
+    profile.ego = EgoRule { world: Some(World::LeftHanded), base: text("car") };
+    profile.radar = RadarRule { azimuth: Some(Side::Right), closing_speed: Some(Sign::Positive) };
     profile.camera.crop = Some(Crop { x: 1, y: 2, width: 3, height: 4 });
     profile.control.steering_lock_rad = Some(0.6);
     let mut drops = Drops::default();
@@ -121,6 +130,7 @@ fn manifest() -> Manifest {
         drops.add(reason, 7, text("why"));
     }
     let mapping = Mapping {
+        rig: text("kitti"),
         camera: text("/camera"),
         camera_info: text("/info"),
         lidar: text("/lidar"),
@@ -128,7 +138,10 @@ fn manifest() -> Manifest {
         pose: Some(PoseSource::Topic("/odom".into())),
         velocity: text("/velocity"),
         control: text("/control"),
+        pedals: text("/pedals"),
         route: text("/route"),
+        weather: text("/weather"),
+        town: text("/world"),
         notes: vec!["a note".into()],
     };
     let mut camera = Camera::from_fov(600, 250, 1.5);
@@ -196,11 +209,22 @@ fn manifest() -> Manifest {
     let transform = PoseSource::Transform("base_link".into());
     let transform = Mapping { pose: Some(transform), ..mapping.clone() };
     let integrated = PoseSource::Integrated { speed: "/speed".into(), yaw_rate: "/imu".into() };
-    let integrated = Mapping { pose: Some(integrated), ..mapping };
+    let integrated = Mapping { pose: Some(integrated), ..mapping.clone() };
+    let gnss = PoseSource::Gnss {
+        fix: "/fix".into(),
+        heading: "/imu".into(),
+        speed: Some("/speed".into()),
+    };
+    let gnss = Mapping { pose: Some(gnss), ..mapping };
     let other = LogRecord { episode: "ep-2".into(), mapping: transform, ..log.clone() };
     let third = LogRecord { episode: "ep-3".into(), mapping: integrated, ..log.clone() };
+    let fourth = LogRecord { episode: "ep-4".into(), mapping: gnss, ..log.clone() };
     let failed = vec![FailedLog { source_log: "b.mcap".into(), error: "why".into() }];
-    Manifest::new(IngestConfig::new(profile, 10.0).unwrap(), vec![log, other, third], failed)
+    Manifest::new(
+        IngestConfig::new(profile, 10.0).unwrap(),
+        vec![log, other, third, fourth],
+        failed,
+    )
 }
 
 /// The fields that a schema file lists for a JSON file: path to type.
@@ -279,7 +303,10 @@ fn json_files_have_the_fields_of_the_schema_file() {
     let logs: Vec<Value> =
         manifest.logs.iter().map(|log| serde_json::to_value(log).unwrap()).collect();
     same_fields(&logs, &listed["logs/*.json"]);
-    same_fields(&[serde_json::to_value(&manifest.config).unwrap()], &listed["ingest.json"]);
+    let mut config = manifest.config.clone();
+    let one = serde_json::to_value(&config).unwrap();
+    config.profile.topics.camera = Some(Names::Several(vec!["/a".into(), "/b".into()]));
+    same_fields(&[one, serde_json::to_value(&config).unwrap()], &listed["ingest.json"]);
 }
 
 #[test]
