@@ -193,7 +193,8 @@ impl Drive {
         let Some(grid) = grid else {
             let what = "there is no instant at which all required signals exist".to_string();
             let hint = "the camera, the ego pose and what the profile requires must overlap in \
-                        time; `pmp-ingest inspect LOG` shows when each begins and ends";
+                        time; `pmp-ingest inspect --json LOG` shows when each begins and ends, \
+                        and --offset or --clock put a clock right";
             return Err(mapping_error(&recording.log, what, hint));
         };
         let (planned, unplaced) =

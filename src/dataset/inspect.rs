@@ -23,6 +23,8 @@ pub struct TopicReport {
     /// Mean rate from the first to the last stamp; `None` below two messages or for topics that
     /// are not read.
     pub rate_hz: Option<f64>,
+    /// First and last stamp, ns, before any clock jumps back.
+    pub stamps_ns: Option<(i64, i64)>,
     pub frame_id: Option<String>,
     /// What it would be used as.
     pub used_as: Option<String>,
@@ -35,6 +37,9 @@ pub struct TopicReport {
 pub struct LogReport {
     pub size_bytes: u64,
     pub messages: u64,
+    /// One, and another from each place on where its clocks jump back; rates, mapping and
+    /// transforms are those of the first.
+    pub episodes: usize,
     pub topics: Vec<TopicReport>,
     pub mapping: Mapping,
     /// Why there is no mapping, where a question is open.
@@ -70,6 +75,7 @@ pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
         type_name: unused.type_name.clone(),
         messages: 0,
         rate_hz: None,
+        stamps_ns: None,
         frame_id: None,
         used_as: None,
         unused_because: Some(unused.why.clone()),
@@ -81,6 +87,7 @@ pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
                 type_name: channel.schema.as_ref().map_or(String::new(), |s| s.name.clone()),
                 messages: 0,
                 rate_hz: None,
+                stamps_ns: None,
                 frame_id: None,
                 used_as: None,
                 unused_because: Some("no messages".to_string()),
@@ -94,6 +101,7 @@ pub fn inspect(path: &Path, profile: &Profile) -> Result<LogReport> {
     Ok(LogReport {
         size_bytes: recording.log.size_bytes,
         messages: recording.log.message_count(),
+        episodes: recordings.len(),
         topics,
         mapping,
         open_question,
@@ -111,6 +119,7 @@ fn read(topic: &Topic, mapping: &Mapping) -> TopicReport {
         type_name: topic.channel.schema.as_ref().map_or(String::new(), |s| s.name.clone()),
         messages: 0,
         rate_hz,
+        stamps_ns: topic.series.span_ns(),
         frame_id: Some(topic.frame_id.clone()).filter(|frame| !frame.is_empty()),
         used_as: mapping.uses(&topic.name),
         unused_because: None,
@@ -168,6 +177,9 @@ impl fmt::Display for LogReport {
         missing("route", self.mapping.route.is_some(), "the driven path stands in for it")?;
         if !self.transforms.is_empty() {
             writeln!(f, "transforms: {}", self.transforms.join(", "))?;
+        }
+        if self.episodes > 1 {
+            writeln!(f, "clocks jump back: the log has {} parts", self.episodes)?;
         }
         for note in &self.mapping.notes {
             writeln!(f, "note: {note}")?;

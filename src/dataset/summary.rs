@@ -4,7 +4,7 @@ use std::fmt::{self, Display, Write as _};
 
 use crate::dataset::{
     account::TopicAccount,
-    manifest::{LogRecord, Manifest},
+    manifest::{EpisodeRecord, LogRecord, Manifest},
 };
 
 /// Damages of one log that are listed; the manifest has them all.
@@ -56,14 +56,8 @@ fn write_log(f: &mut fmt::Formatter, log: &LogRecord) -> fmt::Result {
         log.distance_m,
         log.split.name()
     )?;
-    for (reason, drop) in log.drops.iter() {
-        let mut line = format!("{} ticks left out: {}", drop.count, reason.name());
-        let after_s = (drop.first_ns - log.start_ns) as f64 * 1e-9;
-        write!(line, ", first {after_s:.1} s after the start")?;
-        if let Some(example) = &drop.example {
-            write!(line, " ({example})")?;
-        }
-        writeln!(f, "  {line}")?;
+    for episode in &log.episodes {
+        write_drops(f, episode, log.episodes.len() > 1)?;
     }
     for damage in log.damage.iter().take(LISTED) {
         writeln!(f, "  byte {}: {}", damage.offset, damage.what)?;
@@ -103,6 +97,23 @@ fn write_log(f: &mut fmt::Formatter, log: &LogRecord) -> fmt::Result {
     }
     for note in &log.notes {
         writeln!(f, "  note: {note}")?;
+    }
+    Ok(())
+}
+
+/// A line for each reason; `is_named` where the log has other episodes.
+fn write_drops(f: &mut fmt::Formatter, episode: &EpisodeRecord, is_named: bool) -> fmt::Result {
+    for (reason, drop) in episode.drops.iter() {
+        let mut line = format!("{} ticks left out: {}", drop.count, reason.name());
+        let after_s = (drop.first_ns - episode.start_ns) as f64 * 1e-9;
+        write!(line, ", first {after_s:.1} s after the start")?;
+        if is_named {
+            write!(line, " of {}", episode.id)?;
+        }
+        if let Some(example) = &drop.example {
+            write!(line, " ({example})")?;
+        }
+        writeln!(f, "  {line}")?;
     }
     Ok(())
 }

@@ -8,7 +8,7 @@
 //! back with its stamps, and it joins up with what is there and lies beside it.
 //!
 //! The first topic that jumps begins a new episode. The others follow, each at its own jump where
-//! it has one within [`LINGER_NS`], else at the same place of the file.
+//! it has one within 5 s of its own stamps, else at the same place of the file.
 
 use std::collections::BTreeMap;
 

@@ -248,6 +248,9 @@ fn where_clocks_jump_back_a_new_episode_begins_with_what_was_told_before() {
             assert!((frame.position_m[0] - x).abs() + (frame.position_m[1] - y).abs() < 1e-9);
             assert!(frame.lidar.is_some() && frame.radar.is_some(), "{name}");
         }
+        let inspected = ingest(&["inspect", text(&folder.join(format!("{name}.mcap")))]);
+        let parts = format!("\nclocks jump back: the log has {} parts\n", starts.len());
+        assert!(inspected.out.contains(&parts), "{}", inspected.out);
         let opened = Dataset::open(&dataset).unwrap();
         assert_eq!((opened.train.episodes, opened.val.episodes), (starts.len(), starts.len()));
         assert_eq!(opened.val.len(), 7 * starts.len());
@@ -348,6 +351,24 @@ fn all_episodes_of_a_log_are_on_one_side_and_a_part_without_frames_is_told() {
     assert_eq!((odometry.used, odometry.left_out[&LeftOut::NoFrame]), (101, 101));
     assert_eq!(log.topics.iter().map(|account| account.read).sum::<u64>(), log.messages);
     assert_eq!(into(&folder.join("blind"), &[&folder.join("blind.mcap")]).code, 3);
+}
+
+#[test]
+fn what_is_left_out_of_a_later_episode_is_told_from_its_own_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut messages = again(short().messages(), ns(100.0));
+    let jump_ns = short().start_ns + ns(2.1);
+    messages.retain(|message| {
+        let since_jump_ns = message.log_time_ns - jump_ns;
+        message.topic != CAMERA || !(ns(0.75)..ns(1.25)).contains(&since_jump_ns)
+    });
+    let said = made(folder.path(), "a", &messages, &[]);
+    assert_eq!(said.code, 3, "{}", said.err);
+    let log = &Manifest::read(&folder.path().join("a")).unwrap().logs[0];
+    let id = &log.episodes[1].id;
+    let line = format!("  5 ticks left out: image_gap, first 0.8 s after the start of {id}\n");
+    assert!(said.err.contains(&line), "{}", said.err);
+    assert_eq!((log.drops.total(), log.episodes[0].drops.total()), (5, 0));
 }
 
 /// Where a topic with these stamps, logged at these times, jumps back: the index of the message.
