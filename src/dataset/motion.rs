@@ -78,21 +78,17 @@ impl Motion {
             }
             PoseSource::Gnss { fix, heading, speed } => {
                 let (base, axes) = made_here(rule, &topics[heading], tree);
-                let fixes = match &topics[fix].series {
-                    Series::Fix(fixes) => fixes.as_slice(),
-                    _ => &[],
-                };
-                let positions = gnss::positions(fixes, fix, &mut notes);
-                let speed = speed.as_ref().map(|name| speeds(&topics[name], &base, &axes, tree));
-                let antenna = base.base_from(&topics[fix].frame_id, tree);
-                let antenna_m = antenna.map_or(DVec3::ZERO, |antenna| antenna.position_m);
-                let (heading, frames) = (&topics[heading], (&base, &axes));
-                let headings =
-                    gnss::headings(heading, &positions, antenna_m.x, frames, tree, &mut notes);
-                let poses = headings.map(|headings| {
-                    gnss::poses(&positions, &headings, antenna_m, &speed.unwrap_or_default())
-                });
-                (poses.unwrap_or_default(), base, axes, None)
+                let sources = (&topics[fix], &topics[heading], speed.as_ref().map(|s| &topics[s]));
+                let poses = by_satellites(sources, (&base, &axes), tree, &mut notes);
+                let poses = poses.ok_or_else(|| {
+                    let what = format!("no heading for the positions of {fix}");
+                    let hint = format!(
+                        "{heading} has no attitudes, and the car does not move far enough for a \
+                         course over ground"
+                    );
+                    mapping_error(&recording.log, what, &hint)
+                })?;
+                (poses, base, axes, None)
             }
         };
         let mut motion = Motion { track: EgoTrack::default(), base, axes, world_frame, notes };
@@ -218,6 +214,26 @@ fn brought(
         pose.value = axes.pose(&pose.value.then(&base.child_from_base));
     }
     (poses, base, axes, world_frame)
+}
+
+/// Poses from the topics of positions, of headings and, if there is one, of speeds; `None` if
+/// nothing tells a heading.
+fn by_satellites(
+    (fix, heading, speed): (&Topic, &Topic, Option<&Topic>),
+    (base, axes): (&BaseFrame, &WorldAxes),
+    tree: &TransformTree,
+    notes: &mut Vec<String>,
+) -> Option<Vec<Stamped<Pose>>> {
+    let fixes = match &fix.series {
+        Series::Fix(fixes) => fixes.as_slice(),
+        _ => &[],
+    };
+    let positions = gnss::positions(fixes, &fix.name, notes);
+    let antenna = base.base_from(&fix.frame_id, tree);
+    let antenna_m = antenna.map_or(DVec3::ZERO, |antenna| antenna.position_m);
+    let headings = gnss::headings(heading, &positions, antenna_m.x, (base, axes), tree, notes)?;
+    let speeds = speed.map_or_else(Vec::new, |topic| speeds(topic, base, axes, tree));
+    Some(gnss::poses(&positions, &headings, antenna_m, &speeds))
 }
 
 /// The car's frame and the axes of its sensors, where the world is made here: sensors of a world

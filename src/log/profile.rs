@@ -93,7 +93,7 @@ impl Profile {
     /// range.
     pub fn load(name_or_path: &str) -> Result<Profile> {
         let is_file = Path::new(name_or_path).extension().is_some_and(|e| e == "toml");
-        let profile = if is_file {
+        let mut profile: Profile = if is_file {
             let text =
                 std::fs::read_to_string(name_or_path).map_err(Error::io("read", name_or_path))?;
             toml::from_str(&text).map_err(|error| Error::Config {
@@ -102,9 +102,9 @@ impl Profile {
                 hint: None,
             })?
         } else {
-            let rig = Some(name_or_path.to_string()).filter(|name| name != "auto");
-            Profile { rig, ..Profile::default() }
+            Profile { rig: Some(name_or_path.to_string()), ..Profile::default() }
         };
+        profile.rig = profile.rig.filter(|name| name != "auto");
         profile.check(if is_file { "rig" } else { "--profile" })?;
         Ok(profile)
     }

@@ -20,7 +20,7 @@ use crate::{
         CAMERA_M, CARLA_RADAR_FIELDS, CLOSING_MPS, Messages, NONE, OPTICAL, POINTS, SPEED_MPS,
         YAW_RATE_RADPS, at_rate, carla_radar_point, header, pose, yaw_quaternion,
     },
-    rigs::{bends_to_the_left, ingested},
+    rigs::{bends_to_the_left, ingested, tried},
 };
 
 /// A log with a camera and what `tell` adds at each instant of 20 Hz.
@@ -305,6 +305,18 @@ fn an_attitude_that_does_not_know_north_is_joined_to_the_courses() {
     bends_to_the_left(&frames, 0.06);
     assert!((frames[10].yaw_rad - 0.2).abs() < 0.02, "{}", frames[10].yaw_rad);
     assert!(notes.iter().any(|note| note.contains("lies -115 degrees off")), "{notes:?}");
+}
+
+#[test]
+fn a_standing_receiver_with_a_gyroscope_has_no_heading() {
+    let told = log(|m, t| {
+        m.fix("/gps", t, 0, place(0.0));
+        m.imu("/imu", "base_link", t, None, [0.0; 3]);
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let (said, _) = tried(folder.path(), &told, &[]);
+    assert_eq!(said.code, 1);
+    assert!(said.err.contains("no heading for the positions of /gps"), "{}", said.err);
 }
 
 #[test]

@@ -91,7 +91,7 @@ pub(crate) fn ingested(folder: &Path, log: &[u8], more: &[&str]) -> (Said, Vec<F
     (said, frames, record)
 }
 
-fn tried(folder: &Path, log: &[u8], more: &[&str]) -> (Said, std::path::PathBuf) {
+pub(crate) fn tried(folder: &Path, log: &[u8], more: &[&str]) -> (Said, std::path::PathBuf) {
     let (path, dataset) = (folder.join("drive.mcap"), folder.join("data"));
     fs::write(&path, log).unwrap();
     if dataset.exists() {
@@ -311,6 +311,9 @@ fn a_profile_of_ones_own_may_build_on_a_rig() {
     let (_, frames, record) = ingested(folder.path(), &autoware(), &["--profile", text(&profile)]);
     assert_eq!(record.mapping.rig.as_deref(), Some("autoware"));
     near(f64::from(frames[0].action.steer.unwrap()), -0.5, 1e-6);
+    fs::write(&profile, "rig = \"auto\"\n").unwrap();
+    let (_, _, record) = ingested(folder.path(), &autoware(), &["--profile", text(&profile)]);
+    assert_eq!(record.mapping.rig.as_deref(), Some("autoware"));
     fs::write(&profile, "rig = \"waymo\"\n").unwrap();
     let (said, _) = tried(folder.path(), &autoware(), &["--profile", text(&profile)]);
     assert!(said.err.contains("rig: `waymo` is not a profile"), "{}", said.err);
