@@ -10,8 +10,9 @@ use crate::{
         align::{self, Grid, Signals, Tick},
         control::Controls,
         ego::EgoTrack,
+        footage::{Footage, LeftOut},
         future::future,
-        picture,
+        picture::{self, Decoded},
         ralidar::{lidar_pixels, radar_pixels},
         route::{Path, command},
     },
@@ -19,12 +20,12 @@ use crate::{
     error::Result,
     frame::{Conditions, Frame, Route, Skew},
     log::{
-        APPLIED_CONTROL, CONDITIONS_RECORD,
+        APPLIED_CONTROL, CONDITIONS_RECORD, image,
         mapping::{Mapping, PoseSource},
         profile::Profile,
         reader::Place,
         recording::{Recording, Series, Stamped, Topic, mapping_error},
-        signals::{self, Pose},
+        signals::Pose,
     },
     projection::{Camera, Crop},
 };
@@ -48,6 +49,8 @@ pub struct Drive {
     driven: Path,
     /// Planned routes by the time from which they hold.
     planned: Vec<Stamped<Path>>,
+    /// Of a camera whose pictures depend on each other.
+    footage: Option<Footage>,
     lidar: Option<Sensor>,
     radar: Option<Sensor>,
 }
@@ -62,6 +65,9 @@ struct Sensor {
 
 /// A JPEG and the camera that would have taken it.
 type StoredPicture = (Vec<u8>, Option<Camera>);
+
+/// Stored pictures of a video by their places, or why there is none.
+type Filmed = BTreeMap<(u32, u32), Result<StoredPicture, LeftOut>>;
 
 /// What became of a tick.
 #[derive(Debug)]
@@ -103,6 +109,12 @@ impl Drive {
                         `pmp-ingest inspect LOG` shows what the log has";
             return Err(mapping_error(&recording.log, "no camera".into(), hint));
         };
+
+        let footage = camera_topic.video.as_ref().map(Footage::new).transpose();
+        let footage = footage.map_err(|(what, hint)| {
+            let what = format!("the camera {} cannot be read: {what}", camera_topic.name);
+            mapping_error(&recording.log, what, hint)
+        })?;
 
         let mut notes = mapping.notes.clone();
         let mut left_out = Vec::new();
@@ -180,6 +192,7 @@ impl Drive {
             track,
             driven,
             planned,
+            footage,
             lidar,
             radar,
             recording,
@@ -210,14 +223,17 @@ impl Drive {
     /// If the log cannot be read any more, or the profile's crop does not fit its pictures.
     pub fn frames(&self, ticks: &[Tick]) -> Result<Vec<Made>> {
         let messages = self.fetch(ticks)?;
-        ticks.iter().map(|tick| self.frame(tick, &messages)).collect()
+        let filmed = self.filmed(ticks)?;
+        ticks.iter().map(|tick| self.frame(tick, &messages, &filmed)).collect()
     }
 
-    /// The messages that some ticks need, each segment of the log read once.
+    /// The messages that some ticks need, each segment of the log read once; those of a video,
+    /// which need more than these, are read where it is decoded.
     fn fetch(&self, ticks: &[Tick]) -> Result<BTreeMap<(u32, u32), Vec<u8>>> {
         let mut wanted: BTreeMap<u32, Vec<Place>> = BTreeMap::new();
         for tick in ticks {
-            let heavy = [Some(&tick.image), tick.lidar.as_ref(), tick.radar.as_ref()];
+            let image = Some(&tick.image).filter(|_| self.footage.is_none());
+            let heavy = [image, tick.lidar.as_ref(), tick.radar.as_ref()];
             for sample in heavy.into_iter().flatten() {
                 wanted.entry(sample.value.segment).or_default().push(sample.value);
             }
@@ -233,16 +249,23 @@ impl Drive {
         Ok(messages)
     }
 
-    fn frame(&self, tick: &Tick, messages: &BTreeMap<(u32, u32), Vec<u8>>) -> Result<Made> {
+    fn frame(
+        &self,
+        tick: &Tick,
+        messages: &BTreeMap<(u32, u32), Vec<u8>>,
+        filmed: &Filmed,
+    ) -> Result<Made> {
         let bytes = |place: &Place| &messages[&(place.segment, place.start)];
         let mut damaged = Vec::new();
-        let (image, camera) = match self.image(bytes(&tick.image.value))? {
+        let place = &tick.image.value;
+        let image = match filmed.get(&(place.segment, place.start)) {
+            Some(image) => image.clone(),
+            None => self.still(bytes(place))?,
+        };
+        let (image, camera) = match image {
             Ok(image) => image,
-            Err(why) => {
-                return Ok(Made {
-                    frame: Err((Reason::ImageDamaged, tick.stamp_ns, why)),
-                    damaged,
-                });
+            Err((reason, why)) => {
+                return Ok(Made { frame: Err((reason, tick.stamp_ns, why)), damaged });
             }
         };
         let mut project = |sensor: &Option<Sensor>, sample: &Option<Stamped<Place>>| {
@@ -307,23 +330,50 @@ impl Drive {
         Ok(Made { frame: Ok(Box::new(frame)), damaged })
     }
 
-    /// The picture as it is stored; the inner error says what is wrong with the recorded one.
-    fn image(&self, bytes: &[u8]) -> Result<Result<StoredPicture, String>> {
-        let Some(topic) = self.mapping.camera.as_ref().and_then(|n| self.recording.topics.get(n))
-        else {
-            return Ok(Err("no camera".to_string()));
+    /// The stored picture of a message that holds one.
+    fn still(&self, bytes: &[u8]) -> Result<Result<StoredPicture, LeftOut>> {
+        let damaged = |why: String| Ok(Err((Reason::ImageDamaged, why)));
+        let Some(topic) = self.camera_topic() else { return damaged("no camera".to_string()) };
+        let message = match topic.decode(bytes) {
+            Ok(message) => message,
+            Err(error) => return damaged(error.to_string()),
         };
-        let message = topic.decode(bytes);
-        let rgb = message
-            .and_then(|message| Ok(picture::decode(&signals::picture(topic.kind, &message)?)))
-            .unwrap_or_else(|error| Err(error.to_string()));
-        let rgb = match rgb {
-            Ok(rgb) => rgb,
-            Err(why) => return Ok(Err(why)),
-        };
+        let decoded = image::picture(topic.kind, &message)
+            .map_err(|error| error.to_string())
+            .and_then(|picture| picture::decode(&picture, &self.profile.camera));
+        match decoded {
+            Ok(decoded) => self.store(&decoded),
+            Err(why) => damaged(why),
+        }
+    }
+
+    /// The stored pictures of some ticks of a video, by place; nothing where the camera is no video.
+    fn filmed(&self, ticks: &[Tick]) -> Result<Filmed> {
+        let mut filmed = BTreeMap::new();
+        if let Some((footage, topic)) = self.footage.as_ref().zip(self.camera_topic()) {
+            let wanted: Vec<Place> = ticks.iter().map(|tick| tick.image.value).collect();
+            footage.decode(&self.recording.log, topic, &wanted, &mut |place, picture| {
+                let stored = match picture {
+                    Ok(rgb) => self.store(&Decoded::whole(rgb))?,
+                    Err(left_out) => Err(left_out),
+                };
+                filmed.insert((place.segment, place.start), stored);
+                Ok(())
+            })?;
+        }
+        Ok(filmed)
+    }
+
+    fn store(&self, decoded: &Decoded) -> Result<Result<StoredPicture, LeftOut>> {
         let camera = self.camera.as_ref();
-        let camera = camera.map(|c| self.stored_camera(c, rgb.width, rgb.height)).transpose()?;
-        Ok(picture::stored(&rgb, &self.profile.camera).map(|jpeg| (jpeg, camera)))
+        let camera =
+            camera.map(|c| self.stored_camera(c, decoded.width, decoded.height)).transpose()?;
+        let jpeg = decoded.stored(&self.profile.camera);
+        Ok(jpeg.map(|jpeg| (jpeg, camera)).map_err(|why| (Reason::ImageDamaged, why)))
+    }
+
+    fn camera_topic(&self) -> Option<&Topic> {
+        self.recording.topics.get(self.mapping.camera.as_ref()?)
     }
 
     /// The camera of the stored picture, when the recorded one has this size.

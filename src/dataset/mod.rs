@@ -14,6 +14,7 @@ pub mod route;
 pub mod control;
 pub mod ralidar;
 pub mod picture;
+pub mod footage;
 pub mod align;
 pub mod drive;
 pub mod columns;

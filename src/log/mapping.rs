@@ -192,7 +192,7 @@ fn is_camera(topic: &Topic) -> bool {
     let name = topic.name.to_ascii_lowercase();
     // Pictures that are no photographs: they have the type of a camera and not its content.
     let other = ["depth", "semantic", "segmentation", "instance", "optical_flow", "dvs"];
-    matches!(topic.kind, Kind::CompressedImage | Kind::Image)
+    matches!(topic.kind, Kind::CompressedImage | Kind::CompressedVideo | Kind::Image)
         && !other.iter().any(|word| name.contains(word))
 }
 
@@ -272,8 +272,14 @@ fn front_rank(topic: &Topic) -> u32 {
 }
 
 fn camera_rank(topic: &Topic) -> u32 {
-    // Of two pictures of one camera the compressed one costs less to read.
-    2 * front_rank(topic) + u32::from(topic.kind == Kind::Image)
+    // Of two forms of one camera's pictures, compressed ones cost less to read than raw ones; a
+    // video comes last, since one lost packet takes others with it.
+    let form = match topic.kind {
+        Kind::CompressedVideo => 2,
+        Kind::Image => 1,
+        _ => 0,
+    };
+    3 * front_rank(topic) + form
 }
 
 fn pose_rank(topic: &Topic) -> u32 {

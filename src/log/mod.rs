@@ -1,7 +1,7 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples)
+//! file -> reader (records, damage) -> decoder (values) -> signals, image, video, cloud (samples)
 //!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
 //!           mapping: which topic is which signal        transforms: where each sensor sits
 //! file <- writer (records) <- encode (CDR) <- definitions
@@ -29,6 +29,9 @@ pub mod descriptors;
 pub mod protobuf;
 pub mod json;
 pub mod signals;
+pub mod image;
+pub mod h264;
+pub mod video;
 pub mod cloud;
 pub mod decoder;
 pub mod transforms;

@@ -17,6 +17,7 @@ use crate::{
         signals::{self, CarlaStatus, Control, Header, Kind, Odometry, Pose},
         transforms::TransformTree,
         value::Struct,
+        video::Video,
     },
     projection::Camera,
 };
@@ -53,6 +54,8 @@ pub struct Topic {
     pub channel: Arc<Channel>,
     pub decoder: Arc<Decoder>,
     pub series: Series,
+    /// What the packets of a video depend on; the series locates those that hold a picture.
+    pub video: Option<Video>,
     /// `frame_id` of the first message.
     pub frame_id: String,
     /// `child_frame_id` of the first odometry message.
@@ -152,6 +155,7 @@ impl Builder {
         self.transforms.finish();
         for topic in self.topics.values_mut() {
             topic.series.sort();
+            topic.video.iter_mut().for_each(Video::finish);
         }
         self.unused.sort_by(|a, b| a.topic.cmp(&b.topic));
         let Builder { topics, unused, transforms, .. } = self;
@@ -169,7 +173,8 @@ fn usable(channel: &Channel) -> Result<(Kind, Decoder), String> {
 impl Topic {
     fn new(kind: Kind, channel: Arc<Channel>, decoder: Arc<Decoder>) -> Topic {
         let series = match kind {
-            Kind::CompressedImage | Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
+            Kind::CompressedImage | Kind::CompressedVideo => Series::Located(Vec::new()),
+            Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
             Kind::RadarScan | Kind::RadarTracks => Series::Located(Vec::new()),
             Kind::CameraInfo => Series::CameraInfo(Vec::new()),
             Kind::Odometry => Series::Odometry(Vec::new()),
@@ -188,6 +193,7 @@ impl Topic {
             channel,
             decoder,
             series,
+            video: (kind == Kind::CompressedVideo).then(Video::default),
             frame_id: String::new(),
             child_frame_id: None,
             cloud_fields: Vec::new(),
@@ -226,7 +232,15 @@ impl Topic {
         }
         let decode = || decoder.decode(message.data);
         match &mut self.series {
-            Series::Located(samples) => samples.push(Stamped { stamp_ns, value: message.place }),
+            Series::Located(samples) => {
+                let has_picture = match &mut self.video {
+                    Some(video) => video.add(stamp_ns, message.place, &decode()?)?,
+                    None => true,
+                };
+                if has_picture {
+                    samples.push(Stamped { stamp_ns, value: message.place });
+                }
+            }
             Series::CameraInfo(samples) => {
                 let value = signals::camera_info(&decode()?)?;
                 // Calibration is sent with every picture; only its changes are kept.

@@ -18,6 +18,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     CompressedImage,
+    CompressedVideo,
     Image,
     CameraInfo,
     PointCloud,
@@ -45,6 +46,7 @@ impl Kind {
         }
         Some(match name.as_str() {
             "sensor_msgs/CompressedImage" => Kind::CompressedImage,
+            "ffmpeg_image_transport_msgs/FFMPEGPacket" => Kind::CompressedVideo,
             "sensor_msgs/Image" => Kind::Image,
             "sensor_msgs/CameraInfo" => Kind::CameraInfo,
             "sensor_msgs/PointCloud2" => Kind::PointCloud,
@@ -70,6 +72,7 @@ impl Kind {
     fn of_foxglove(name: &str) -> Option<Kind> {
         Some(match name {
             "CompressedImage" => Kind::CompressedImage,
+            "CompressedVideo" => Kind::CompressedVideo,
             "RawImage" => Kind::Image,
             "CameraCalibration" => Kind::CameraInfo,
             "PointCloud" => Kind::PointCloud,
@@ -128,35 +131,6 @@ pub struct RadarReturn {
     pub position_m: DVec3,
     /// Radial speed relative to the sensor, m/s, negative = approaching.
     pub radial_speed_mps: f64,
-}
-
-/// A picture as it lies in its message.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Picture<'a> {
-    /// JPEG, PNG ...: `format` as the message says it.
-    Compressed { data: &'a [u8] },
-    /// Rows of pixels.
-    Raw { width: usize, height: usize, encoding: Encoding, row_bytes: usize, data: &'a [u8] },
-}
-
-/// Pixel layouts of `sensor_msgs/Image`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    Rgb8,
-    Bgr8,
-    Rgba8,
-    Bgra8,
-    Mono8,
-}
-
-impl Encoding {
-    pub fn pixel_bytes(self) -> usize {
-        match self {
-            Encoding::Mono8 => 1,
-            Encoding::Rgb8 | Encoding::Bgr8 => 3,
-            Encoding::Rgba8 | Encoding::Bgra8 => 4,
-        }
-    }
 }
 
 /// The header of a message that has one, or of a value that is one.
@@ -328,38 +302,6 @@ pub fn radar_tracks(message: &Struct) -> Result<Vec<RadarReturn>> {
         Ok(RadarReturn { position_m, radial_speed_mps })
     };
     message.parts("tracks")?.map(track).collect()
-}
-
-/// `sensor_msgs/CompressedImage`, `sensor_msgs/Image` or `foxglove.RawImage`.
-pub fn picture<'m>(kind: Kind, message: &'m Struct) -> Result<Picture<'m>> {
-    let data = message.bytes("data")?;
-    if kind == Kind::CompressedImage {
-        return Ok(Picture::Compressed { data });
-    }
-    let fail = |what: String| Error::Decode { schema: message.name.to_string(), offset: 0, what };
-    let encoding = match message.text("encoding")? {
-        "rgb8" | "8UC3" => Encoding::Rgb8,
-        "bgr8" => Encoding::Bgr8,
-        "rgba8" => Encoding::Rgba8,
-        "bgra8" => Encoding::Bgra8,
-        "mono8" | "8UC1" => Encoding::Mono8,
-        other => return Err(fail(format!("pixel encoding `{other}` is not known"))),
-    };
-    let size = |field: &str| -> Result<usize> {
-        usize::try_from(message.int(field)?)
-            .map_err(|_error| fail(format!("`{field}` is negative")))
-    };
-    let (width, height, row_bytes) = (size("width")?, size("height")?, size("step")?);
-    let row_fits = width.checked_mul(encoding.pixel_bytes()).is_some_and(|row| row <= row_bytes);
-    let fits = row_bytes.checked_mul(height).is_some_and(|all| all <= data.len());
-    if width == 0 || height == 0 || !row_fits || !fits {
-        let what = format!(
-            "{width} x {height} pixels in rows of {row_bytes} bytes do not fit {} bytes",
-            data.len()
-        );
-        return Err(fail(what));
-    }
-    Ok(Picture::Raw { width, height, encoding, row_bytes, data })
 }
 
 fn vector(part: &Struct) -> Result<DVec3> {

@@ -408,6 +408,7 @@ fn controls(kind: Kind, samples: &[Control], profile: &Profile, track: &EgoTrack
         }),
         decoder: Arc::new(Decoder::Cdr(Schema { types: Vec::new() })),
         series: Series::Control(stamped),
+        video: None,
         frame_id: String::new(),
         child_frame_id: None,
         cloud_fields: Vec::new(),
