@@ -71,6 +71,11 @@ fn ffmpeg() -> Option<String> {
     Some(String::from_utf8(found?.stdout).unwrap())
 }
 
+type Packets = Vec<Vec<u8>>;
+
+/// RGB, one picture after the other.
+type Pictures = Vec<Vec<u8>>;
+
 /// Packets of a test picture that FFmpeg moves and encodes with x264, and the RGB that FFmpeg decodes
 /// from them.
 pub(crate) fn ffmpeg_packets(
@@ -78,7 +83,7 @@ pub(crate) fn ffmpeg_packets(
     height: usize,
     count: usize,
     options: &[&str],
-) -> Option<(Vec<Vec<u8>>, Vec<Vec<u8>>)> {
+) -> Option<(Packets, Pictures)> {
     let ffmpeg = ffmpeg()?;
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
