@@ -64,7 +64,8 @@ pub(crate) fn cloud(input: &[u8]) -> bool {
     let decoder = Decoder::of(&channel).expect("a definition that pmp writes");
     let Ok(message) = decoder.decode(input) else { return false };
     let camera = Camera::from_fov(64, 32, 1.5);
-    let _ = radar_pixels(Kind::PointCloud, &message, &RadarRule::default(), &Pose::IDENTITY, &camera);
+    let _ =
+        radar_pixels(Kind::PointCloud, &message, &RadarRule::default(), &Pose::IDENTITY, &camera);
     lidar_pixels(&message, &Pose::IDENTITY, &camera).is_ok()
 }
 

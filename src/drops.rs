@@ -12,6 +12,8 @@ pub enum Reason {
     ImageGap,
     /// A picture that cannot be decoded.
     ImageDamaged,
+    /// A picture of a video that begins with a later key frame.
+    ImageBeforeKeyFrame,
     /// The ego motion has a gap around the tick.
     EgoGap,
     /// A required lidar, radar or control has no sample within the tolerance.
@@ -21,9 +23,10 @@ pub enum Reason {
 }
 
 impl Reason {
-    pub const ALL: [Reason; 6] = [
+    pub const ALL: [Reason; 7] = [
         Reason::ImageGap,
         Reason::ImageDamaged,
+        Reason::ImageBeforeKeyFrame,
         Reason::EgoGap,
         Reason::LidarGap,
         Reason::RadarGap,
@@ -35,6 +38,7 @@ impl Reason {
         match self {
             Reason::ImageGap => "image_gap",
             Reason::ImageDamaged => "image_damaged",
+            Reason::ImageBeforeKeyFrame => "image_before_key_frame",
             Reason::EgoGap => "ego_gap",
             Reason::LidarGap => "lidar_gap",
             Reason::RadarGap => "radar_gap",

@@ -42,6 +42,16 @@ pub struct Crop {
     pub height: usize,
 }
 
+impl Crop {
+    /// Whether it is a part of a picture of that size.
+    pub fn lies_inside(&self, width: usize, height: usize) -> bool {
+        self.width > 0
+            && self.height > 0
+            && self.x.checked_add(self.width).is_some_and(|right| right <= width)
+            && self.y.checked_add(self.height).is_some_and(|bottom| bottom <= height)
+    }
+}
+
 impl Camera {
     /// A distortion-free camera from its horizontal field of view, square pixels, centred.
     pub fn from_fov(width: usize, height: usize, horizontal_fov_rad: f64) -> Self {
@@ -65,11 +75,7 @@ impl Camera {
     ///
     /// [`Error::Config`] if the crop does not lie inside the picture.
     pub fn cropped_and_scaled(&self, crop: Crop, width: usize, height: usize) -> Result<Camera> {
-        let inside = crop.width > 0
-            && crop.height > 0
-            && crop.x.checked_add(crop.width).is_some_and(|right| right <= self.width)
-            && crop.y.checked_add(crop.height).is_some_and(|bottom| bottom <= self.height);
-        if !inside {
+        if !crop.lies_inside(self.width, self.height) {
             return Err(Error::Config {
                 key: "camera.crop".into(),
                 what: format!(

@@ -55,6 +55,7 @@ enum Inspect {
 
 /// What flags say of how to read a log.
 #[derive(Args)]
+#[group(skip)]
 struct Reading {
     /// Name the topic of a signal, as camera=/front/image; may be given again
     #[arg(long = "topic", value_name = "SIGNAL=NAME")]

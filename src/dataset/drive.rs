@@ -11,9 +11,10 @@ use crate::{
         clocks,
         conditions::conditions,
         control::Controls,
+        footage::{Footage, LeftOut},
         future::future,
         motion::Motion,
-        picture::{self, Rgb},
+        picture::{self, Decoded},
         ralidar::{lidar_pixels, radar_pixels},
         route::{self, Path, command},
     },
@@ -23,12 +24,14 @@ use crate::{
     log::{
         APPLIED_CONTROL, CONDITIONS_RECORD,
         candidates::measures_no_speed,
+        image,
         mapping::Mapping,
         profile::{CameraRule, Profile},
         reader::{Place, SegmentReader},
         recording::{Recording, Series, Stamped, Topic, Unused, mapping_error},
         rigs::Rig,
-        signals::{self, Pose},
+        signals::Pose,
+        value::Struct,
     },
     projection::{Camera, Crop},
 };
@@ -56,6 +59,8 @@ pub struct Drive {
     driven: Path,
     /// Planned routes by the time from which they hold.
     planned: Vec<Stamped<Path>>,
+    /// Of a camera whose pictures depend on each other.
+    footage: Option<Footage>,
     lidar: Option<Sensor>,
     radar: Option<Sensor>,
 }
@@ -80,7 +85,7 @@ enum Signal {
 #[derive(Debug)]
 enum Sensed {
     /// JPEG as stored.
-    Picture(Result<Vec<u8>, String>),
+    Picture(Result<Vec<u8>, LeftOut>),
     Lidar(Result<LidarPixels, String>),
     Radar(Result<RadarPixels, String>),
 }
@@ -138,6 +143,12 @@ impl Drive {
                         `pmp-ingest inspect LOG` shows what the log has";
             return Err(explain(mapping_error(&recording.log, "no camera".into(), hint)));
         };
+
+        let footage = camera_topic.video.as_ref().map(Footage::new).transpose();
+        let footage = footage.map_err(|(what, hint)| {
+            let what = format!("the camera {} cannot be read: {what}", camera_topic.name);
+            mapping_error(&recording.log, what, hint)
+        })?;
 
         let mut notes = mapping.notes.clone();
         notes.extend(unreadable.iter().cloned());
@@ -206,7 +217,8 @@ impl Drive {
                 topic.name
             ));
         }
-        let picture_size = picture_size(&recording, camera_topic)?;
+        let picture_size =
+            picture_size(&recording, camera_topic, footage.as_ref(), &profile.camera)?;
         let stored = |camera: &Camera| stored_camera(camera, picture_size, &profile.camera);
         let stored_camera = camera.as_ref().map(stored).transpose()?;
         let conditions = conditions(&recording, &mapping, &profile, &mut notes);
@@ -225,6 +237,7 @@ impl Drive {
             motion,
             driven,
             planned,
+            footage,
             lidar,
             radar,
             recording,
@@ -268,7 +281,9 @@ impl Drive {
     fn sense(&self, ticks: &[Tick]) -> Result<BTreeMap<Place, Sensed>> {
         let mut wanted = BTreeMap::new();
         for tick in ticks {
-            wanted.insert(tick.image.value, (Signal::Camera, tick.image.stamp_ns));
+            if self.footage.is_none() {
+                wanted.insert(tick.image.value, (Signal::Camera, tick.image.stamp_ns));
+            }
             for (signal, sample) in [(Signal::Lidar, &tick.lidar), (Signal::Radar, &tick.radar)] {
                 wanted.extend(sample.as_ref().map(|s| (s.value, (signal, s.stamp_ns))));
             }
@@ -304,6 +319,17 @@ impl Drive {
             };
             sensed.insert(place, shown);
         }
+        if let Some(footage) = &self.footage {
+            let wanted: Vec<Place> = ticks.iter().map(|tick| tick.image.value).collect();
+            let log = &self.recording.log;
+            footage.decode(log, self.camera_topic(), &wanted, &mut |place, picture| {
+                let stored = picture.and_then(|rgb| {
+                    let stored = self.store(&Decoded::whole(rgb));
+                    stored.map_err(|why| (Reason::ImageDamaged, why))
+                });
+                sensed.insert(place, Sensed::Picture(stored));
+            })?;
+        }
         Ok(sensed)
     }
 
@@ -311,8 +337,8 @@ impl Drive {
         let mut damaged = Vec::new();
         let image = match &sensed[&tick.image.value] {
             Sensed::Picture(Ok(jpeg)) => jpeg.clone(),
-            Sensed::Picture(Err(why)) => {
-                let frame = Err((Reason::ImageDamaged, tick.stamp_ns, why.clone()));
+            Sensed::Picture(Err((reason, why))) => {
+                let frame = Err((*reason, tick.stamp_ns, why.clone()));
                 return Made { frame, damaged };
             }
             Sensed::Lidar(_) | Sensed::Radar(_) => unreachable!("the image is the camera's"),
@@ -368,17 +394,24 @@ impl Drive {
         Made { frame: Ok(Box::new(frame)), damaged }
     }
 
-    /// The picture of a message as it is stored, or what is wrong with it.
-    fn picture(&self, message: &[u8]) -> Result<Vec<u8>, String> {
-        let rgb = recorded_picture(self.camera_topic(), message)?;
-        if (rgb.width, rgb.height) != self.picture_size {
+    /// The picture of a message as it is stored, or why there is none.
+    fn picture(&self, message: &[u8]) -> Result<Vec<u8>, LeftOut> {
+        let message = self.camera_topic().decode(message).map_err(|error| error.to_string());
+        let stored = message.and_then(|message| {
+            self.store(&recorded_picture(self.camera_topic(), &message, &self.profile.camera)?)
+        });
+        stored.map_err(|why| (Reason::ImageDamaged, why))
+    }
+
+    fn store(&self, recorded: &Decoded) -> Result<Vec<u8>, String> {
+        if (recorded.width, recorded.height) != self.picture_size {
             let (width, height) = self.picture_size;
             return Err(format!(
                 "{} x {} pixels, where the first picture of the drive has {width} x {height}",
-                rgb.width, rgb.height
+                recorded.width, recorded.height
             ));
         }
-        picture::stored(&rgb, &self.profile.camera)
+        recorded.stored(&self.profile.camera)
     }
 
     /// Bring the returns of a sensor's message onto the stored picture.
@@ -415,25 +448,43 @@ impl Drive {
 }
 
 /// The picture of a message as it was recorded, or what is wrong with it.
-fn recorded_picture(topic: &Topic, message: &[u8]) -> Result<Rgb, String> {
-    let message = topic.decode(message).map_err(|error| error.to_string())?;
-    let picture = signals::picture(topic.kind, &message).map_err(|error| error.to_string())?;
-    picture::decode(&picture)
+fn recorded_picture<'m>(
+    topic: &Topic,
+    message: &'m Struct,
+    rule: &CameraRule,
+) -> Result<Decoded<'m>, String> {
+    let picture = image::picture(topic.kind, message).map_err(|error| error.to_string())?;
+    picture::decode(&picture, rule)
 }
 
 /// Width and height of the first picture that can be decoded: those of all pictures of a drive,
 /// so that one calibration holds for all its frames.
-fn picture_size(recording: &Recording, camera: &Topic) -> Result<(usize, usize)> {
+fn picture_size(
+    recording: &Recording,
+    camera: &Topic,
+    footage: Option<&Footage>,
+    rule: &CameraRule,
+) -> Result<(usize, usize)> {
     let Series::Located(samples) = &camera.series else { return Ok((0, 0)) };
     let mut reader = SegmentReader::new(&recording.log);
-    let mut why = String::new();
+    let mut size = Err("there is none".to_string());
     for sample in samples {
-        match recorded_picture(camera, reader.message(&sample.value)?) {
-            Ok(rgb) => return Ok((rgb.width, rgb.height)),
-            Err(error) => why = error,
+        if let Some(footage) = footage {
+            footage.decode(&recording.log, camera, &[sample.value], &mut |_, picture| {
+                size = picture.map(|rgb| (rgb.width, rgb.height)).map_err(|(_, why)| why);
+            })?;
+        } else {
+            let message = camera.decode(reader.message(&sample.value)?);
+            size = message.map_err(|error| error.to_string()).and_then(|message| {
+                recorded_picture(camera, &message, rule).map(|p| (p.width, p.height))
+            });
+        }
+        if let Ok(size) = size {
+            return Ok(size);
         }
     }
     let what = format!("none of the {} pictures of {} can be decoded", samples.len(), camera.name);
+    let why = size.err().unwrap_or_default();
     Err(mapping_error(&recording.log, what, &format!("the last one: {why}")))
 }
 

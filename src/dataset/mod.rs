@@ -25,6 +25,7 @@ pub mod conditions;
 pub mod radar;
 pub mod ralidar;
 pub mod picture;
+pub mod footage;
 pub mod align;
 pub mod clocks;
 pub mod drive;

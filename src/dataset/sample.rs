@@ -8,7 +8,10 @@
 use half::f16;
 
 use crate::{
-    dataset::picture,
+    dataset::picture::{
+        jpeg,
+        scale::{self, Area},
+    },
     error::{Error, Result},
     frame::{Command, FUTURE_STEPS, Frame, IMAGE_HEIGHT, IMAGE_WIDTH, ROUTE_POINTS},
 };
@@ -58,7 +61,7 @@ impl Sample {
     ///
     /// # Errors
     ///
-    /// [`Error::Picture`] if the JPEG cannot be decoded, is larger than [`picture::MAX_SIDE`], or a
+    /// [`Error::Picture`] if the JPEG cannot be decoded, is larger than [`MAX_SIDE`](crate::dataset::picture::rgb::MAX_SIDE), or a
     /// return lies outside of the picture.
     pub fn new(frame: &Frame, size: Option<InputSize>) -> Result<Self> {
         let wrong = |what: String| Error::Picture { frame: frame.index, what };
@@ -68,8 +71,8 @@ impl Sample {
                 camera = vec![0; 3 * size.height * size.width];
                 InputSize { height: IMAGE_HEIGHT, width: IMAGE_WIDTH }
             } else {
-                let stored = picture::decode_jpeg(&frame.image).map_err(wrong)?;
-                let shrunk = picture::resize(&stored, None, size.width, size.height);
+                let stored = jpeg::decode(&frame.image).map_err(wrong)?;
+                let shrunk = scale::resize(&stored, Area::whole(&stored), size.width, size.height);
                 camera = planes(&shrunk.map_err(wrong)?.data);
                 InputSize { height: stored.height, width: stored.width }
             };

@@ -49,8 +49,16 @@ pub const CAMERA: Candidate = Candidate {
     signal: "camera",
     named: |topics| topics.camera.as_ref(),
     fits: |topic, _| is_photograph(topic),
-    // Of two pictures of one camera the compressed one costs less to read.
-    rank: |topic| 2 * camera_rank(topic) + u32::from(topic.kind == Kind::Image),
+    // Of two forms of one camera's pictures, compressed ones cost less to read than raw ones; a
+    // video comes last, since one lost packet takes others with it.
+    rank: |topic| {
+        let form = match topic.kind {
+            Kind::CompressedVideo => 2,
+            Kind::Image => 1,
+            _ => 0,
+        };
+        3 * camera_rank(topic) + form
+    },
     is_question: are_of_different_frames,
 };
 
@@ -196,7 +204,7 @@ fn is_photograph(topic: &Topic) -> bool {
     let name = name_of(topic);
     // Pictures that are no photographs: they have the type of a camera and not its content.
     let other = ["depth", "semantic", "segmentation", "instance", "optical_flow", "dvs"];
-    matches!(topic.kind, Kind::CompressedImage | Kind::Image)
+    matches!(topic.kind, Kind::CompressedImage | Kind::CompressedVideo | Kind::Image)
         && !other.iter().any(|word| name.contains(word))
 }
 

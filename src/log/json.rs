@@ -121,11 +121,7 @@ impl<'a> DeserializeSeed<'a> for Reading<'a, '_> {
     type Value = Value<'a>;
 
     fn deserialize<D: de::Deserializer<'a>>(self, text: D) -> Result<Value<'a>, D::Error> {
-        let values = self.place.values.get() + 1;
-        self.place.values.set(values);
-        if values > MAX_VALUES {
-            return Err(de::Error::custom("more values than a message may have"));
-        }
+        self.place.count(1)?;
         text.deserialize_any(self)
     }
 }
@@ -170,9 +166,25 @@ impl<'a> Visitor<'a> for Reading<'a, '_> {
     fn visit_seq<A: SeqAccess<'a>>(self, mut items: A) -> Result<Value<'a>, A::Error> {
         let node = self.place.node.and_then(|node| node.items.as_deref());
         let place = Place { node, key: "", ..self.place };
+        let mut bytes = Vec::new();
         let mut list = Vec::new();
         while let Some(item) = items.next_element_seed(Reading { place, only: None })? {
-            list.push(item);
+            match item {
+                // Bytes take no more memory than their text, so they are not counted.
+                Value::Int(byte @ 0..=255) if list.is_empty() => {
+                    bytes.push(byte as u8);
+                    place.values.set(place.values.get() - 1);
+                }
+                item => {
+                    place.count(bytes.len())?;
+                    list.extend(bytes.drain(..).map(|byte| Value::Int(i64::from(byte))));
+                    list.push(item);
+                }
+            }
+        }
+        if !bytes.is_empty() {
+            let (bytes, scalar) = (Cow::Owned(bytes), Scalar::U8);
+            return Ok(Value::Numbers(Numbers { bytes, scalar, endian: Endian::Little }));
         }
         let number = |item: &Value| match item {
             Value::Int(value) => Some(*value as f64),
@@ -207,6 +219,16 @@ impl<'a> Visitor<'a> for Reading<'a, '_> {
 }
 
 impl<'a> Place<'a, '_> {
+    /// Note values that take memory.
+    fn count<E: de::Error>(&self, more: usize) -> Result<(), E> {
+        let values = self.values.get() + more;
+        self.values.set(values);
+        match values > MAX_VALUES {
+            true => Err(de::Error::custom("more values than a message may have")),
+            false => Ok(()),
+        }
+    }
+
     fn text<E: de::Error>(self, text: Cow<'a, str>) -> Result<Value<'a>, E> {
         let is_base64 = self.node.is_some_and(|node| node.is_base64);
         if !is_base64 && self.key != BYTES_FIELD {

@@ -1,7 +1,7 @@
 //! Logs: MCAP files in and out, and what their messages say.
 //!
 //! ```text
-//! file -> reader (records, damage) -> decoder (values) -> signals, cloud (samples) -> scan (recordings)
+//! file -> reader (records, damage) -> decoder (values) -> signals, image, video, cloud (samples) -> scan (recordings)
 //!           definitions: schema, idl, descriptors    messages: wire, cdr, ros1, protobuf, json
 //!           clock: which instant, jumps: where it goes back
 //!           rigs, profile -> mapping: which topic is which signal
@@ -34,6 +34,9 @@ pub mod descriptors;
 pub mod protobuf;
 pub mod json;
 pub mod signals;
+pub mod image;
+pub mod h264;
+pub mod video;
 pub mod cloud;
 pub mod decoder;
 pub mod transforms;

@@ -21,6 +21,7 @@ use crate::{
         },
         transforms::TransformTree,
         value::Struct,
+        video::Video,
     },
     projection::Camera,
 };
@@ -59,6 +60,8 @@ pub struct Topic {
     pub channel: Arc<Channel>,
     pub decoder: Arc<Decoder>,
     pub series: Series,
+    /// What the packets of a video depend on; the series locates those that hold a picture.
+    pub video: Option<Video>,
     /// `frame_id` of the first message.
     pub frame_id: String,
     /// `child_frame_id` of the first odometry message.
@@ -158,7 +161,8 @@ impl Topic {
         clock: &ClockRule,
     ) -> Topic {
         let series = match kind {
-            Kind::CompressedImage | Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
+            Kind::CompressedImage | Kind::CompressedVideo => Series::Located(Vec::new()),
+            Kind::Image | Kind::PointCloud => Series::Located(Vec::new()),
             Kind::RadarScan | Kind::RadarTracks => Series::Located(Vec::new()),
             Kind::CameraInfo => Series::CameraInfo(Vec::new()),
             Kind::Odometry => Series::Odometry(Vec::new()),
@@ -185,6 +189,7 @@ impl Topic {
             channel,
             decoder,
             series,
+            video: (kind == Kind::CompressedVideo).then(Video::default),
             frame_id: String::new(),
             child_frame_id: None,
             cloud_fields: Vec::new(),
@@ -252,7 +257,15 @@ impl Topic {
         let decoder = self.decoder.clone();
         let decode = || decoder.decode(message.data);
         match &mut self.series {
-            Series::Located(samples) => samples.push(Stamped { stamp_ns, value: message.place }),
+            Series::Located(samples) => {
+                let has_picture = match &mut self.video {
+                    Some(video) => video.add(stamp_ns, message.place, &decode()?)?,
+                    None => true,
+                };
+                if has_picture {
+                    samples.push(Stamped { stamp_ns, value: message.place });
+                }
+            }
             Series::CameraInfo(samples) => {
                 let value = signals::camera_info(&decode()?)?;
                 // Calibration is sent with every picture; only its changes are kept, and the first
@@ -336,6 +349,7 @@ impl Topic {
     pub(super) fn split_off(&mut self, at: TopicMark) -> Topic {
         let later = Topic {
             series: self.series.split_off(at.samples),
+            video: self.video.as_mut().map(|video| video.split_off(at.samples)),
             messages: self.messages - at.messages,
             undecodable: (self.undecodable.0 - at.undecodable, self.undecodable.1.clone()),
             ..self.clone()
@@ -352,6 +366,7 @@ impl Topic {
         let unset_ns = moved_ns(0, self.offset_ns);
         let unset = self.series.count_at(unset_ns);
         self.series.sort();
+        self.video.iter_mut().for_each(Video::finish);
         if matches!(self.series, Series::CameraInfo(_)) {
             return;
         }

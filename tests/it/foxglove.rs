@@ -11,10 +11,12 @@ use pmp::{
         clock::ClockRule,
         cloud::Cloud,
         decoder::Decoder,
+        image::{self, Encoding, Picture, Pixels},
         profile::Profile,
         reader::{Channel, SchemaRecord},
         recording::{Recording, Series},
-        signals::{self, Encoding, Kind, Picture},
+        signals::{self, Kind},
+        value::Endian,
     },
 };
 use serde_json::{Value as Json, json};
@@ -46,7 +48,7 @@ fn cloud(points: &[Vec<f64>], names: &[&str], position: [f64; 3], turn: [f64; 4]
 
 /// The messages of a fixture's drive as Foxglove's types; it has no controls, and its poses come
 /// without velocities.
-fn told(drive: &DriveLog) -> Vec<Told> {
+pub(crate) fn told(drive: &DriveLog) -> Vec<Told> {
     let mut messages = Vec::new();
     let mut tell = |topic, type_name, t: f64, frame_id: &str, mut values: Json| {
         let stamp_ns = drive.start_ns + ns(t);
@@ -199,31 +201,32 @@ const STAMP_NS: i64 = 1_700_000_000_123_456_789;
 
 #[test]
 fn raw_pictures_of_all_pixel_layouts_are_found() {
-    let layouts = [
-        ("rgb8", Encoding::Rgb8),
-        ("bgr8", Encoding::Bgr8),
-        ("rgba8", Encoding::Rgba8),
-        ("bgra8", Encoding::Bgra8),
-        ("mono8", Encoding::Mono8),
-        ("8UC1", Encoding::Mono8),
-    ];
-    for (name, expected) in layouts {
-        let step = 2 * expected.pixel_bytes();
+    for (name, pixel_bytes) in [
+        ("rgb8", 3),
+        ("bgr8", 3),
+        ("rgba8", 4),
+        ("bgra8", 4),
+        ("mono8", 1),
+        ("mono16", 2),
+        ("yuyv", 2),
+    ] {
+        let step = 2 * pixel_bytes;
         let data: Vec<u8> = (0..3 * step as u8).collect();
         let values = json!({
             "timestamp": time(STAMP_NS), "frame_id": "camera", "width": 2, "height": 3,
             "encoding": name, "step": step, "data": base64(&data),
         });
         in_all_forms("RawImage", &values, |message| {
-            let picture = signals::picture(Kind::Image, message).unwrap();
-            let raw = Picture::Raw {
+            let picture = image::picture(Kind::Image, message).unwrap();
+            let raw = Pixels {
                 width: 2,
                 height: 3,
-                encoding: expected,
+                encoding: Encoding::of(name).unwrap(),
                 row_bytes: step,
+                endian: Endian::Little,
                 data: &data,
             };
-            assert_eq!(picture, raw);
+            assert_eq!(picture, Picture::Raw(raw));
         });
     }
 }
@@ -388,6 +391,6 @@ fn json_pictures_without_a_schema_are_tried_as_base64() {
     let Series::Located(samples) = &topic.series else { panic!("{:?}", topic.series) };
     assert_eq!(samples[0].stamp_ns, 7_000_000_005);
     let message = topic.decode(text.as_bytes()).unwrap();
-    let read = signals::picture(topic.kind, &message).unwrap();
+    let read = image::picture(topic.kind, &message).unwrap();
     assert_eq!(read, Picture::Compressed { data: &picture });
 }

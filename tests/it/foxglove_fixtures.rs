@@ -43,6 +43,15 @@ const TYPES: &[(&str, Fields)] = &[
         ],
     ),
     (
+        "CompressedVideo",
+        &[
+            ("timestamp", 1, "time"),
+            ("frame_id", 2, "string"),
+            ("data", 3, "bytes"),
+            ("format", 4, "string"),
+        ],
+    ),
+    (
         "RawImage",
         &[
             ("timestamp", 1, "time"),

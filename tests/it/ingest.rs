@@ -214,8 +214,8 @@ fn gaps_and_damaged_pictures_are_left_out_counted_and_end_in_3() {
     assert_eq!(said.code, 3, "{}", said.err);
     let lines = [
         "  5 ticks left out: image_gap, first 0.5 s after the start\n",
-        "  1 ticks left out: image_damaged, first 2.5 s after the start (neither JPEG nor PNG: it \
-         begins with [6e, 6f, 20, 70])\n",
+        "  1 ticks left out: image_damaged, first 2.5 s after the start (neither JPEG, PNG nor WebP: \
+         it begins with [6e, 6f, 20, 70])\n",
         "  3 ticks left out: ego_gap, first 1.6 s after the start\n",
     ];
     for line in lines {

@@ -13,6 +13,11 @@ mod decoding;
 mod ros1;
 mod idl;
 mod foxglove;
+mod pictures;
+#[cfg(feature = "h264")]
+mod video_fixtures;
+#[cfg(feature = "h264")]
+mod video;
 mod protobuf;
 mod logs;
 mod fuzz_corpus;

@@ -6,6 +6,7 @@ use crate::log::schema::short_name;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     CompressedImage,
+    CompressedVideo,
     Image,
     CameraInfo,
     PointCloud,
@@ -40,6 +41,7 @@ impl Kind {
         }
         Some(match name.as_str() {
             "sensor_msgs/CompressedImage" => Kind::CompressedImage,
+            "ffmpeg_image_transport_msgs/FFMPEGPacket" => Kind::CompressedVideo,
             "sensor_msgs/Image" => Kind::Image,
             "sensor_msgs/CameraInfo" => Kind::CameraInfo,
             "sensor_msgs/PointCloud2" => Kind::PointCloud,
@@ -78,6 +80,7 @@ impl Kind {
     fn of_foxglove(name: &str) -> Option<Kind> {
         Some(match name {
             "CompressedImage" => Kind::CompressedImage,
+            "CompressedVideo" => Kind::CompressedVideo,
             "RawImage" => Kind::Image,
             "CameraCalibration" => Kind::CameraInfo,
             "PointCloud" => Kind::PointCloud,

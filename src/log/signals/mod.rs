@@ -14,7 +14,7 @@ pub mod radar;
 pub mod route;
 pub mod conditions;
 
-pub use camera::{Encoding, Picture, camera_info, picture};
+pub use camera::camera_info;
 pub use conditions::{Weather, carla_town, carla_weather};
 pub use control::{
     CarlaStatus, Control, ackermann, actuation, carla_control, carla_status, steering_report,
