@@ -70,7 +70,9 @@ struct Reading {
     offset: Vec<(String, f64)>,
 }
 
+// Named, since clap does not count the arguments of a struct that has flattened ones in it.
 #[derive(Args)]
+#[group(args = ["logs", "out"])]
 struct Ingest {
     /// MCAP files, or folders searched for `*.mcap`
     #[arg(required = true, value_name = "LOG")]
@@ -120,6 +122,7 @@ fn profile_help() -> String {
         names.join(", ")
     )
 }
+
 const CLOCK: &str = "TOPIC=header|log|publish";
 
 const EXAMPLES: &str = "\
