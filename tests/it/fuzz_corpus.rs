@@ -5,9 +5,12 @@ use std::{fs, path::Path};
 #[path = "../../fuzz/inputs.rs"]
 mod inputs;
 
+/// Runs an input; whether it was understood.
+type Run = fn(&[u8]) -> bool;
+
 #[test]
 fn no_input_of_the_corpus_panics_and_every_seed_is_understood() {
-    let targets: [(&str, fn(&[u8]) -> bool); 6] = [
+    let targets: [(&str, Run); 6] = [
         ("mcap", inputs::mcap),
         ("cdr", inputs::cdr),
         ("ros1", inputs::ros1),

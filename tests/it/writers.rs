@@ -9,6 +9,7 @@ use serde_json::Value as Json;
 use crate::ingest::{frames, into};
 
 /// The Python that has the peers' packages: scripts/check.sh makes one.
+#[allow(clippy::disallowed_methods)] // Where the peers are is no setting of pmp's.
 pub(crate) fn python() -> String {
     env::var("PMP_PYTHON").unwrap_or_else(|_| "python3".to_string())
 }
