@@ -11,7 +11,7 @@
 //! others anew; every file's bytes are a function of the log and the configuration alone.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
@@ -104,8 +104,20 @@ pub fn ingest(
         Some(share) => share.of(logs),
         None => logs.to_vec(),
     };
-    let hashes: Vec<Result<String>> = logs.par_iter().map(|log| sha256_of_file(log)).collect();
-    let mut jobs: Vec<Source> = Vec::new();
+    let hashes: Vec<Result<Option<String>>> = match share.is_some() || Manifest::path(out).exists()
+    {
+        true => logs.par_iter().map(|log| sha256_of_file(log).map(Some)).collect(),
+        false => {
+            let ambiguous = sizes_that_may_be_known(&logs, out)?;
+            let hash = |log: &PathBuf| {
+                let bytes = fs::metadata(log).map_err(Error::io("find", log))?.len();
+                let is_needed = ambiguous.contains(&bytes);
+                is_needed.then(|| sha256_of_file(log)).transpose()
+            };
+            logs.par_iter().map(hash).collect()
+        }
+    };
+    let mut jobs: Vec<Job> = Vec::new();
     let mut failed = Vec::new();
     let mut first_error = None;
     let mut fail = |log: &Path, error: Error| {
@@ -118,7 +130,8 @@ pub fn ingest(
     for (log, hash) in logs.iter().zip(hashes) {
         match hash {
             Err(error) => fail(log, error),
-            Ok(sha256) => match seen.get(&sha256) {
+            Ok(None) => jobs.push(Job { path: log.clone(), source: None }),
+            Ok(Some(sha256)) => match seen.get(&sha256) {
                 Some(other) => {
                     let what = format!("the same bytes as {}", file_name(other));
                     let (path, hint) = (log.clone(), Some("name each log once".to_string()));
@@ -126,7 +139,8 @@ pub fn ingest(
                 }
                 None => {
                     seen.insert(sha256.clone(), log);
-                    jobs.push(Source::new(log.clone(), sha256));
+                    let source = Some(Source::new(log.clone(), sha256));
+                    jobs.push(Job { path: log.clone(), source });
                 }
             },
         }
@@ -150,10 +164,7 @@ pub fn ingest(
             Ok(record) => committed.push(record),
             // The disk is the same for all logs: what it refuses once is no matter of one log.
             Err(error @ Error::Io { .. }) if fs::metadata(&job.path).is_ok() => return Err(error),
-            Err(error) => {
-                job.discard(out, &job.episode)?;
-                fail(&job.path, error);
-            }
+            Err(error) => fail(&job.path, error),
         }
     }
     let has_nothing_to_do = jobs.is_empty() && failed.is_empty() && share.is_some();
@@ -202,7 +213,35 @@ impl Share {
     }
 }
 
-impl Source {
+/// Sizes of logs whose bytes have to be told apart before they are read: of those that are
+/// committed, and of those that are given twice. All others are hashed while they are read.
+fn sizes_that_may_be_known(logs: &[PathBuf], out: &Path) -> Result<BTreeSet<u64>> {
+    let (mut seen, mut twice) = (BTreeSet::new(), BTreeSet::new());
+    for log in logs {
+        let bytes = fs::metadata(log).map_or(0, |metadata| metadata.len());
+        if !seen.insert(bytes) {
+            twice.insert(bytes);
+        }
+    }
+    let records = out.join("logs");
+    let Ok(entries) = fs::read_dir(&records) else { return Ok(twice) };
+    for entry in entries {
+        let path = entry.map_err(Error::io("read", &records))?.path();
+        if path.extension().is_some_and(|extension| extension == "json") {
+            let record: LogRecord = atomic::read_json(&path)?;
+            twice.insert(record.source_bytes);
+        }
+    }
+    Ok(twice)
+}
+
+/// A log to commit; its bytes may be known only when it has been read.
+struct Job {
+    path: PathBuf,
+    source: Option<Source>,
+}
+
+impl Job {
     /// Commit the log, or find that it is committed.
     fn commit(
         &self,
@@ -211,32 +250,63 @@ impl Source {
         blocks_at_once: usize,
         on: &(dyn Fn(Event) + Sync),
     ) -> Result<LogRecord> {
-        let held = claim.hold(&self.episode)?;
-        let record = self.ingest(claim, config, blocks_at_once, on);
-        held.release()?;
-        record
+        let scan = || Recording::scan(&self.path, &config.profile.clock);
+        match &self.source {
+            Some(source) => {
+                let held = claim.hold(&source.episode)?;
+                let record = match source.committed(claim)? {
+                    Some(record) => Ok(record),
+                    None => scan().and_then(|recordings| {
+                        source.ingest(recordings, claim, config, blocks_at_once, on)
+                    }),
+                };
+                held.release()?;
+                record
+            }
+            None => {
+                let recordings = scan()?;
+                let source = Source::new(self.path.clone(), recordings[0].log.sha256.clone());
+                source.ingest(recordings, claim, config, blocks_at_once, on)
+            }
+        }
+    }
+}
+
+impl Source {
+    fn record_path(&self, out: &Path) -> PathBuf {
+        out.join("logs").join(format!("{}.json", self.episode))
     }
 
-    fn ingest(
-        &self,
-        claim: &Claim,
-        config: &IngestConfig,
-        blocks_at_once: usize,
-        on: &(dyn Fn(Event) + Sync),
-    ) -> Result<LogRecord> {
+    /// The record of the log, if it is committed.
+    fn committed(&self, claim: &Claim) -> Result<Option<LogRecord>> {
         let out = &claim.out;
-        let record_path = out.join("logs").join(format!("{}.json", self.episode));
+        let record_path = self.record_path(out);
         if record_path.exists() {
             let record: LogRecord = atomic::read_json(&record_path)?;
             // The same bytes under another name have another record; which one stays is for the
             // process to say that sees all names.
             let is_own = claim.is_share || record.source_log == file_name(&self.path);
             if is_own && record.shards.iter().all(|shard| is_whole(out, shard)) {
-                return Ok(record);
+                return Ok(Some(record));
             }
         }
+        Ok(None)
+    }
+
+    /// Make the frames of all parts of the log, and its record.
+    fn ingest(
+        &self,
+        recordings: Vec<Recording>,
+        claim: &Claim,
+        config: &IngestConfig,
+        blocks_at_once: usize,
+        on: &(dyn Fn(Event) + Sync),
+    ) -> Result<LogRecord> {
+        let out = &claim.out;
+        // What an attempt that was killed has left.
+        self.discard(out, &self.episode)?;
         let mut parts = Parts::default();
-        for recording in Recording::scan(&self.path, &config.profile.clock)? {
+        for recording in recordings {
             parts.scanned(&recording);
             let lost = account::without_frames(&recording);
             let id = parts.next_id(self);
@@ -256,7 +326,7 @@ impl Source {
             }
         }
         let record = parts.record(self)?;
-        atomic::write_json(&record_path, &record)?;
+        atomic::write_json(&self.record_path(out), &record)?;
         Ok(record)
     }
 
@@ -276,11 +346,13 @@ impl Source {
 }
 
 /// A finished dataset is answered with itself, if it was made from these logs.
-fn same_logs(finished: Manifest, jobs: &[Source], out: &Path) -> Result<Manifest> {
+fn same_logs(finished: Manifest, jobs: &[Job], out: &Path) -> Result<Manifest> {
     let has: Vec<&str> = finished.logs.iter().map(|log| log.episode.as_str()).collect();
     let failed: Vec<&str> = finished.failed.iter().map(|log| log.source_log.as_str()).collect();
     let new = jobs.iter().find(|job| {
-        !has.contains(&job.episode.as_str()) && !failed.contains(&file_name(&job.path).as_str())
+        let episode = job.source.as_ref().map(|source| source.episode.as_str());
+        let is_in = episode.is_some_and(|episode| has.contains(&episode));
+        !is_in && !failed.contains(&file_name(&job.path).as_str())
     });
     if let Some(job) = new {
         let what = format!("a finished dataset, without {}", job.path.display());
