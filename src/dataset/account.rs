@@ -239,10 +239,10 @@ fn use_topic(drive: &Drive, fates: &Fates, topic: &Topic, account: &mut TopicAcc
         Series::Located(samples) if is(&mapping.camera) => {
             by_tick(&stamps(samples), &fates.camera, tolerance.camera);
         }
-        Series::Located(samples) if is(&mapping.lidar) && drive.has_lidar() => {
+        Series::Located(samples) if is(&mapping.lidar) && drive.senses.lidar().is_some() => {
             by_tick(&stamps(samples), &fates.lidar, tolerance.lidar);
         }
-        Series::Located(samples) if is(&mapping.radar) && drive.has_radar() => {
+        Series::Located(samples) if is(&mapping.radar) && drive.senses.radar().is_some() => {
             by_tick(&stamps(samples), &fates.radar, tolerance.radar);
         }
         Series::Located(_) if topic.kind != Kind::Transforms => {

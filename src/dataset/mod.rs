@@ -3,7 +3,7 @@
 //! ```text
 //! samples -> motion -> ego (pose, velocity) -> future, route, control, conditions   labels
 //!            odometry, /tf, dead_reckoning, gnss (geodesy, heading); world, base_frame
-//!         -> align (grid) -> drive (frames: picture, ralidar) -> columns -> shard
+//!         -> align (grid) -> senses (picture, ralidar) -> drive (frames) -> columns -> shard
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! ingest: one log after the other, each committed alone; split, manifest, episodes, summary, inspect
 //! open (which frames train, which judge) -> order -> sample -> batch, by loader
@@ -28,6 +28,7 @@ pub mod picture;
 pub mod footage;
 pub mod align;
 pub mod clocks;
+pub mod senses;
 pub mod drive;
 pub mod columns;
 pub mod shard;

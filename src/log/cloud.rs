@@ -87,6 +87,12 @@ impl<'a> Cloud<'a> {
             );
             return Err(fail(what));
         }
+        // Rows that lie in each other would be billions of points in a few bytes.
+        if height > 1 && last_row.is_none_or(|row| row > row_step) {
+            let what = format!("{height} rows of {width} points in steps of {row_step} bytes");
+            return Err(fail(what));
+        }
+        let height = if width == 0 { 0 } else { height };
         let frame_from_points = None;
         Ok(Cloud { fields, frame_from_points, data, endian, width, height, point_step, row_step })
     }
