@@ -1,6 +1,6 @@
 //! Lidar and radar onto the picture: the nearest return of each pixel (paper §III.C2).
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use half::f16;
 
 use crate::{
@@ -34,10 +34,15 @@ pub fn lidar_pixels(
         Some(pose) => camera_from_sensor.then(pose),
         None => *camera_from_sensor,
     };
+    // A matrix, since there are tens of thousands of points.
+    let camera_from_points = DAffine3::from_rotation_translation(
+        camera_from_points.rotation,
+        camera_from_points.position_m,
+    );
     let mut nearest = Nearest::new(camera);
     for point in cloud.points() {
         let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
-        let camera_m = camera_from_points.transform_point(point_m);
+        let camera_m = camera_from_points.transform_point3(point_m);
         nearest.add(camera_m, camera_m);
     }
     let mut pixels = LidarPixels::default();

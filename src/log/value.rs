@@ -35,6 +35,7 @@ impl Scalar {
     }
 
     /// The number in the first [`size`](Scalar::size) bytes, as f64 (exact up to 2^53).
+    #[inline]
     pub fn read(self, bytes: &[u8], endian: Endian) -> f64 {
         macro_rules! number {
             ($t:ty) => {{
