@@ -18,6 +18,7 @@ pub mod projection;
 pub mod drops;
 pub mod frame;
 pub mod log;
+pub mod noise;
 pub mod policy;
 pub mod dataset;
 pub mod sim;

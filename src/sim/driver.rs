@@ -5,11 +5,11 @@
 
 use glam::DVec2;
 
+use crate::noise::Noise;
 use crate::{
     policy::Action,
     sim::{
         cruise::{Ahead, Cruise},
-        noise::Noise,
         road::{OWN_LANE_M, Road},
         vehicle::{HALF_LENGTH_M, STEER_LOCK_RAD, VehicleState, WHEELBASE_M, pedals},
     },
@@ -126,7 +126,8 @@ fn pursuit_rad(road: &Road, ego: &VehicleState, s_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{noise::Purpose, vehicle::STEP_S};
+    use crate::noise::Purpose;
+    use crate::sim::vehicle::STEP_S;
 
     #[test]
     fn the_lane_is_kept_through_bursts_and_curves_and_bursts_are_there() {

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
 
+use crate::noise::Noise;
 use crate::sim::{
-    noise::Noise,
     road::{Road, Surface},
     scene::{Scene, Solid},
 };
@@ -155,7 +155,8 @@ pub fn direction(azimuth_rad: f64, elevation_rad: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{car::Car, noise::Purpose, road::Piece};
+    use crate::noise::Purpose;
+    use crate::sim::{car::Car, road::Piece};
 
     fn straight() -> Road {
         Road::from_pieces(&[Piece { length_m: 600.0, start_per_m: 0.0, end_per_m: 0.0 }])

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use jpeg_encoder::{ColorType, Encoder};
 
+use crate::noise::Noise;
 use crate::{
     log::encode::{
         Accel, CameraInfo, CarlaEgoVehicleControl, CarlaEgoVehicleStatus, CompressedImage, Header,
@@ -11,7 +12,7 @@ use crate::{
     },
     policy::Action,
     projection::Camera,
-    sim::{camera, lidar, noise::Noise, radar, vehicle::VehicleState},
+    sim::{camera, lidar, radar, vehicle::VehicleState},
 };
 
 /// Frames of the log; transforms between them are on `/tf` and `/tf_static`.

@@ -4,7 +4,6 @@
 //! stream keyed by (seed, episode, purpose), so one build makes the same bytes of the same drive,
 //! however many threads it has.
 
-pub mod noise;
 pub mod road;
 pub mod vehicle;
 pub mod cruise;

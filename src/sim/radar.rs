@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
 
-use crate::sim::{lidar::direction, noise::Noise, scene::Scene, vehicle::VehicleState};
+use crate::noise::Noise;
+use crate::sim::{lidar::direction, scene::Scene, vehicle::VehicleState};
 
 /// Field of view, rad.
 pub const WIDTH_RAD: f64 = 35.0 / 360.0 * TAU;
@@ -105,7 +106,8 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::sim::{car::Car, noise::Purpose};
+    use crate::noise::Purpose;
+    use crate::sim::car::Car;
 
     fn ego() -> VehicleState {
         VehicleState { position_m: DVec2::new(5.0, 3.0), speed_mps: 10.0, ..Default::default() }

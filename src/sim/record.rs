@@ -12,6 +12,7 @@ use std::{
 
 use rayon::prelude::*;
 
+use crate::noise::{Noise, Purpose};
 use crate::{
     error::{Error, Result},
     frame::Conditions,
@@ -21,9 +22,7 @@ use crate::{
         writer::{LogOptions, LogWriter},
     },
     sim::{
-        camera, lidar, messages,
-        noise::{Noise, Purpose},
-        radar,
+        camera, lidar, messages, radar,
         vehicle::{STEP_S, VehicleState},
         world::World,
     },

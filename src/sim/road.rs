@@ -7,7 +7,7 @@
 
 use glam::DVec2;
 
-use crate::sim::noise::Noise;
+use crate::noise::Noise;
 
 /// Width of each of the two lanes, m.
 pub const LANE_WIDTH_M: f64 = 3.5;
@@ -240,7 +240,7 @@ fn turn(angle_rad: f64, radius_m: f64) -> [Piece; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::noise::Purpose;
+    use crate::noise::Purpose;
 
     fn road() -> Road {
         Road::generate(&mut Noise::new(3, 0, Purpose::Road), 3000.0)

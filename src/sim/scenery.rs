@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
+use crate::noise::Noise;
 use crate::sim::{
-    noise::Noise,
     road::{LANE_WIDTH_M, Road, SHOULDER_M},
     scene::{Decal, Paint, Rgb, Scene, Shape, Solid},
 };

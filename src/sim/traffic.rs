@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
+use crate::noise::Noise;
 use crate::sim::{
     car::{Car, PAINTS},
     cruise::{Ahead, Cruise},
     driver::DECISION_S,
-    noise::Noise,
     road::{LANE_WIDTH_M, OWN_LANE_M, Road, SHOULDER_M},
     scene::{Rgb, Scene},
     scenery::beside,

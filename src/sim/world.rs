@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
+use crate::noise::{Noise, Purpose};
 use crate::sim::{
     driver::{DECISION_S, Decision, Driver, View},
-    noise::{Noise, Purpose},
     road::{OWN_LANE_M, Road},
     scene::Scene,
     scenery,
