@@ -30,6 +30,13 @@ impl Noise {
         Noise(rng)
     }
 
+    /// The stream of one actor's own: what others draw changes nothing for it.
+    pub fn of_actor(seed: u64, episode: u32, actor: u32) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(1 << 63 | u64::from(episode) << 31 | u64::from(actor));
+        Noise(rng)
+    }
+
     /// Uniform in [`low`, `high`).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()

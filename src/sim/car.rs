@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::sim::{
-    scene::{Decal, Paint, Rgb, Scene, Shape, Solid},
-    vehicle::{HALF_LENGTH_M, HALF_WIDTH_M},
+use crate::{
+    sim::scene::{Decal, Paint, Rgb, Scene, Shape, Solid},
+    world::ego::SEDAN,
 };
 
 /// Colours that cars come in.
@@ -47,15 +47,15 @@ impl Car {
         let body = Shape {
             foot_m: DVec3::new(0.0, 0.0, BODY_FROM_M),
             height_m: BODY_HEIGHT_M,
-            lower_m: [HALF_LENGTH_M, HALF_WIDTH_M],
-            upper_m: [HALF_LENGTH_M - 0.12, HALF_WIDTH_M - 0.06],
+            lower_m: [SEDAN.half_length_m, SEDAN.half_width_m],
+            upper_m: [SEDAN.half_length_m - 0.12, SEDAN.half_width_m - 0.06],
             lean_m: 0.0,
         };
         let cabin = Shape {
             foot_m: DVec3::new(-0.25, 0.0, BODY_FROM_M + BODY_HEIGHT_M),
             height_m: CABIN_HEIGHT_M,
-            lower_m: [1.45, HALF_WIDTH_M - 0.08],
-            upper_m: [0.85, HALF_WIDTH_M - 0.24],
+            lower_m: [1.45, SEDAN.half_width_m - 0.08],
+            upper_m: [0.85, SEDAN.half_width_m - 0.24],
             lean_m: -0.1,
         };
         add(body, self.paint, self.paint, 0.6);
@@ -69,7 +69,7 @@ impl Car {
             // The sun stands to the south-west, so shadows fall a little the other way.
             ground + DVec3::new(0.12, 0.25, 0.0)
         };
-        let (x, y) = (HALF_LENGTH_M + 0.1, HALF_WIDTH_M + 0.12);
+        let (x, y) = (SEDAN.half_length_m + 0.1, SEDAN.half_width_m + 0.12);
         scene.shadows_m.push([spread(x, y), spread(-x, y), spread(-x, -y), spread(x, -y)]);
     }
 
@@ -88,10 +88,10 @@ impl Car {
             scene.decals.push(Decal { corners_m, colour, glows });
         };
         for y in [[0.48, 0.84], [-0.84, -0.48]] {
-            add(-HALF_LENGTH_M, y, [0.58, 0.76], tail, self.braking);
-            add(HALF_LENGTH_M, y, [0.55, 0.72], [250, 248, 225], true);
+            add(-SEDAN.half_length_m, y, [0.58, 0.76], tail, self.braking);
+            add(SEDAN.half_length_m, y, [0.55, 0.72], [250, 248, 225], true);
         }
-        add(-HALF_LENGTH_M, [-0.26, 0.26], [0.5, 0.62], [235, 232, 200], false);
-        add(HALF_LENGTH_M, [-0.4, 0.4], [0.4, 0.56], [30, 30, 32], false);
+        add(-SEDAN.half_length_m, [-0.26, 0.26], [0.5, 0.62], [235, 232, 200], false);
+        add(SEDAN.half_length_m, [-0.4, 0.4], [0.4, 0.56], [30, 30, 32], false);
     }
 }

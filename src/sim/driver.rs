@@ -5,14 +5,14 @@
 
 use glam::DVec2;
 
-use crate::noise::Noise;
 use crate::{
+    noise::Noise,
     policy::Action,
     sim::{
         cruise::{Ahead, Cruise},
         road::{OWN_LANE_M, Road},
-        vehicle::{HALF_LENGTH_M, STEER_LOCK_RAD, VehicleState, WHEELBASE_M, pedals},
     },
+    world::ego::{Car, SEDAN},
 };
 
 /// Time between two decisions, s.
@@ -69,8 +69,8 @@ impl Driver {
     }
 
     /// The next decision; to be asked for every [`DECISION_S`].
-    pub fn decide(&mut self, road: &Road, ego: &VehicleState, view: View) -> Decision {
-        let front_m = view.s_m + HALF_LENGTH_M;
+    pub fn decide(&mut self, road: &Road, ego: &Car, view: View) -> Decision {
+        let front_m = view.s_m + SEDAN.half_length_m;
         let acceleration = self.cruise.acceleration_mps2(
             road,
             front_m,
@@ -79,8 +79,8 @@ impl Driver {
             view.ahead,
             DECISION_S,
         );
-        let (throttle, brake) = pedals(acceleration, ego.speed_mps);
-        let steer = (-pursuit_rad(road, ego, view.s_m) / STEER_LOCK_RAD).clamp(-1.0, 1.0) as f32;
+        let (throttle, brake) = ego.config.pedals(acceleration, ego.speed_mps);
+        let steer = ego.config.steer(pursuit_rad(road, ego, view.s_m), ego.speed_mps) as f32;
         let wanted = Action { steer, throttle, brake };
         let pull = self.disturbance(ego.speed_mps, view.oncoming) as f32;
         Decision { wanted, applied: Action { steer: (steer + pull).clamp(-1.0, 1.0), ..wanted } }
@@ -97,8 +97,8 @@ impl Driver {
                 // twice over a triangle; the driver fights it.
                 let pull_mps2 = (4.0 * push_m / duration_s.powi(2)).min(BURST_MAX_MPS2);
                 let side = self.noise.pick(&[-1.0, 1.0]);
-                let angle_rad = side * pull_mps2 * WHEELBASE_M / speed_mps.powi(2);
-                let peak = angle_rad / STEER_LOCK_RAD;
+                let angle_rad = side * pull_mps2 * SEDAN.wheelbase_m / speed_mps.powi(2);
+                let peak = SEDAN.steer(-angle_rad, speed_mps);
                 self.burst = Some(Burst { peak, duration_s, age_s: 0.0 });
             }
             return 0.0;
@@ -114,27 +114,26 @@ impl Driver {
 }
 
 /// The front wheels' angle that takes the rear axle to a point ahead on the lane (Coulter, 1992).
-fn pursuit_rad(road: &Road, ego: &VehicleState, s_m: f64) -> f64 {
+fn pursuit_rad(road: &Road, ego: &Car, s_m: f64) -> f64 {
     let axle_m = ego.rear_axle_m();
-    let (axle_s, _) = road.project_near(axle_m, s_m - WHEELBASE_M / 2.0);
+    let (axle_s, _) = road.project_near(axle_m, s_m - SEDAN.wheelbase_m / 2.0);
     let aim_m = (AIM_S * ego.speed_mps).max(AIM_MIN_M);
     let target = road.place(axle_s + aim_m, OWN_LANE_M) - axle_m;
     let aside_m = DVec2::from_angle(ego.yaw_rad).perp_dot(target);
-    (2.0 * WHEELBASE_M * aside_m / target.length_squared()).atan()
+    (2.0 * SEDAN.wheelbase_m * aside_m / target.length_squared()).atan()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::noise::Purpose;
-    use crate::sim::vehicle::STEP_S;
+    use crate::world::ego::STEP_S;
 
     #[test]
     fn the_lane_is_kept_through_bursts_and_curves_and_bursts_are_there() {
         let road = Road::generate(&mut Noise::new(5, 0, Purpose::Road), 2500.0);
         let mut driver = Driver::new(Noise::new(5, 0, Purpose::Driver));
-        let mut ego =
-            VehicleState { position_m: road.place(20.0, OWN_LANE_M), ..Default::default() };
+        let mut ego = Car { position_m: road.place(20.0, OWN_LANE_M), ..Default::default() };
         ego.yaw_rad = road.at(20.0).heading_rad;
         let (mut s, mut decision) = (20.0, Decision::default());
         let (mut worst, mut disturbed, mut stops) = (0.0_f64, 0, 0);

@@ -7,10 +7,12 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
 
-use crate::noise::Noise;
-use crate::sim::{
-    road::{Road, Surface},
-    scene::{Scene, Solid},
+use crate::{
+    noise::Noise,
+    sim::{
+        road::{Road, Surface},
+        scene::{Scene, Solid},
+    },
 };
 
 /// Beams, and the elevation of the lowest and the highest, rad.

@@ -3,16 +3,17 @@
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use jpeg_encoder::{ColorType, Encoder};
 
-use crate::noise::Noise;
 use crate::{
     log::encode::{
         Accel, CameraInfo, CarlaEgoVehicleControl, CarlaEgoVehicleStatus, CompressedImage, Header,
         Imu, Odometry, PointCloud2, PointField, Pose, PoseWithCovariance, RadarReturn, RadarScan,
         RegionOfInterest, TfMessage, Transform, TransformStamped, Twist, TwistWithCovariance,
     },
+    noise::Noise,
     policy::Action,
     projection::Camera,
-    sim::{camera, lidar, radar, vehicle::VehicleState},
+    sim::{camera, lidar, radar},
+    world::ego::Car,
 };
 
 /// Frames of the log; transforms between them are on `/tf` and `/tf_static`.
@@ -122,7 +123,7 @@ pub fn radar_scan(stamp_ns: i64, returns: &[radar::RadarReturn]) -> RadarScan {
 }
 
 /// Where the car measures itself to be: pose in the world frame, twist in its own.
-pub fn odometry(stamp_ns: i64, ego: &VehicleState, noise: &mut Noise) -> Odometry {
+pub fn odometry(stamp_ns: i64, ego: &Car, noise: &mut Noise) -> Odometry {
     let mut near = |value: f64, std: f64| value + noise.normal(std);
     let position = DVec3::new(
         near(ego.position_m.x, POSITION_STD_M),
@@ -165,7 +166,7 @@ fn planar_covariance(linear_std: f64, angular_std: f64) -> [f64; 36] {
 /// The inertial unit at the ego frame's origin: gravity pushes it up.
 ///
 /// `acceleration_mps2` is that of the origin, in the world frame.
-pub fn imu(stamp_ns: i64, ego: &VehicleState, acceleration_mps2: DVec2, noise: &mut Noise) -> Imu {
+pub fn imu(stamp_ns: i64, ego: &Car, acceleration_mps2: DVec2, noise: &mut Noise) -> Imu {
     let felt = DVec2::from_angle(-ego.yaw_rad).rotate(acceleration_mps2);
     let mut shaken = |x: f64, y: f64, z: f64, std: f64| {
         DVec3::new(x + noise.normal(std), y + noise.normal(std), z + noise.normal(std))
@@ -200,7 +201,7 @@ pub fn control(stamp_ns: i64, action: &Action) -> CarlaEgoVehicleControl {
 }
 
 /// The car's own report, with the control that reached it.
-pub fn status(stamp_ns: i64, ego: &VehicleState, applied: &Action) -> CarlaEgoVehicleStatus {
+pub fn status(stamp_ns: i64, ego: &Car, applied: &Action) -> CarlaEgoVehicleStatus {
     CarlaEgoVehicleStatus {
         header: header(stamp_ns, WORLD),
         velocity: ego.velocity_ego_mps().length() as f32,

@@ -5,7 +5,6 @@
 //! however many threads it has.
 
 pub mod road;
-pub mod vehicle;
 pub mod cruise;
 pub mod driver;
 pub mod scene;

@@ -8,8 +8,11 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
 
-use crate::noise::Noise;
-use crate::sim::{lidar::direction, scene::Scene, vehicle::VehicleState};
+use crate::{
+    noise::Noise,
+    sim::{lidar::direction, scene::Scene},
+    world::ego::Car,
+};
 
 /// Field of view, rad.
 pub const WIDTH_RAD: f64 = 35.0 / 360.0 * TAU;
@@ -49,7 +52,7 @@ pub fn ego_from_radar() -> DAffine3 {
 }
 
 /// One scan.
-pub fn scan(scene: &Scene, ego: &VehicleState, noise: &mut Noise) -> Vec<RadarReturn> {
+pub fn scan(scene: &Scene, ego: &Car, noise: &mut Noise) -> Vec<RadarReturn> {
     let world_from_radar = ego.world_from_ego() * ego_from_radar();
     let origin_m = world_from_radar.translation;
     let sensor_mps = velocity_mps(ego);
@@ -96,7 +99,7 @@ pub fn scan(scene: &Scene, ego: &VehicleState, noise: &mut Noise) -> Vec<RadarRe
 }
 
 /// Velocity of the radar in the world frame, with what the car's turning adds, m/s.
-fn velocity_mps(ego: &VehicleState) -> DVec3 {
+fn velocity_mps(ego: &Car) -> DVec3 {
     let turning = DVec3::new(0.0, 0.0, ego.yaw_rate_radps()).cross(ego_from_radar().translation);
     ego.orientation() * (ego.velocity_ego_mps().extend(0.0) + turning)
 }
@@ -106,11 +109,10 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::noise::Purpose;
-    use crate::sim::car::Car;
+    use crate::{noise::Purpose, sim::car::Car, world::ego};
 
-    fn ego() -> VehicleState {
-        VehicleState { position_m: DVec2::new(5.0, 3.0), speed_mps: 10.0, ..Default::default() }
+    fn ego() -> ego::Car {
+        ego::Car { position_m: DVec2::new(5.0, 3.0), speed_mps: 10.0, ..Default::default() }
     }
 
     fn returns_of_car(speed_mps: f64) -> Vec<RadarReturn> {

@@ -12,7 +12,6 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::noise::{Noise, Purpose};
 use crate::{
     error::{Error, Result},
     frame::Conditions,
@@ -21,11 +20,9 @@ use crate::{
         encode::Message,
         writer::{LogOptions, LogWriter},
     },
-    sim::{
-        camera, lidar, messages, radar,
-        vehicle::{STEP_S, VehicleState},
-        world::World,
-    },
+    noise::{Noise, Purpose},
+    sim::{camera, lidar, messages, radar, world::World},
+    world::ego::{Car, STEP_S},
 };
 
 /// Stamp of the first step of episode 0; episodes start [`EPISODE_APART_NS`] apart.
@@ -213,7 +210,7 @@ struct Sent {
 /// A world, its sensors, and the messages that are on their way.
 struct Recorder {
     world: World,
-    before: VehicleState,
+    before: Car,
     stamp_ns: i64,
     lidar: Noise,
     radar: Noise,

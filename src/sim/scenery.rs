@@ -2,10 +2,12 @@
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
-use crate::noise::Noise;
-use crate::sim::{
-    road::{LANE_WIDTH_M, Road, SHOULDER_M},
-    scene::{Decal, Paint, Rgb, Scene, Shape, Solid},
+use crate::{
+    noise::Noise,
+    sim::{
+        road::{LANE_WIDTH_M, Road, SHOULDER_M},
+        scene::{Decal, Paint, Rgb, Scene, Shape, Solid},
+    },
 };
 
 const POST_EVERY_M: f64 = 25.0;

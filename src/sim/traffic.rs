@@ -2,15 +2,17 @@
 
 use glam::DVec3;
 
-use crate::noise::Noise;
-use crate::sim::{
-    car::{Car, PAINTS},
-    cruise::{Ahead, Cruise},
-    driver::DECISION_S,
-    road::{LANE_WIDTH_M, OWN_LANE_M, Road, SHOULDER_M},
-    scene::{Rgb, Scene},
-    scenery::beside,
-    vehicle::{HALF_LENGTH_M, HALF_WIDTH_M, STEP_S},
+use crate::{
+    noise::Noise,
+    sim::{
+        car::{Car, PAINTS},
+        cruise::{Ahead, Cruise},
+        driver::DECISION_S,
+        road::{LANE_WIDTH_M, OWN_LANE_M, Road, SHOULDER_M},
+        scene::{Rgb, Scene},
+        scenery::beside,
+    },
+    world::ego::{SEDAN, STEP_S},
 };
 
 /// What oncoming cars drive on a straight, m/s.
@@ -88,7 +90,7 @@ impl Traffic {
     /// The lead car, for a front bumper at arc length `front_m`.
     pub fn ahead(&self, front_m: f64) -> Option<Ahead> {
         let car = &self.lead.as_ref()?.car;
-        Some(Ahead { gap_m: car.s_m - HALF_LENGTH_M - front_m, speed_mps: car.speed_mps })
+        Some(Ahead { gap_m: car.s_m - SEDAN.half_length_m - front_m, speed_mps: car.speed_mps })
     }
 
     /// Whether an oncoming car will soon pass a car at arc length `s_m`.
@@ -115,7 +117,7 @@ impl Lead {
             self.wish_mps = noise.uniform(7.0, 12.5);
             self.content_s = noise.uniform(6.0, 15.0);
         }
-        let front_m = self.car.s_m + HALF_LENGTH_M;
+        let front_m = self.car.s_m + SEDAN.half_length_m;
         let speed_mps = self.car.speed_mps;
         self.car.acceleration_mps2 = self.cruise.acceleration_mps2(
             road,
@@ -151,7 +153,7 @@ impl LaneCar {
 
 /// Cars parked on the verge of the right-hand side.
 pub fn add_parked(scene: &mut Scene, noise: &mut Noise, road: &Road) {
-    let lateral_m = -(LANE_WIDTH_M + SHOULDER_M + HALF_WIDTH_M + 0.4);
+    let lateral_m = -(LANE_WIDTH_M + SHOULDER_M + SEDAN.half_width_m + 0.4);
     let mut s_m = noise.uniform(30.0, 90.0);
     while s_m < road.length_m() {
         let world_from_car = beside(road, s_m, lateral_m);

@@ -2,14 +2,16 @@
 
 use glam::DVec3;
 
-use crate::noise::{Noise, Purpose};
-use crate::sim::{
-    driver::{DECISION_S, Decision, Driver, View},
-    road::{OWN_LANE_M, Road},
-    scene::Scene,
-    scenery,
-    traffic::{self, Traffic},
-    vehicle::{HALF_LENGTH_M, STEP_S, VehicleState},
+use crate::{
+    noise::{Noise, Purpose},
+    sim::{
+        driver::{DECISION_S, Decision, Driver, View},
+        road::{OWN_LANE_M, Road},
+        scene::Scene,
+        scenery,
+        traffic::{self, Traffic},
+    },
+    world::ego::{Car, SEDAN, STEP_S},
 };
 
 /// Where the ego vehicle starts, m along the road.
@@ -32,7 +34,7 @@ pub struct World {
     scenery: Scene,
     traffic: Traffic,
     driver: Driver,
-    ego: VehicleState,
+    ego: Car,
     /// Arc length of the ego frame's origin, m.
     s_m: f64,
     decision: Decision,
@@ -48,11 +50,8 @@ impl World {
         let mut scenery_noise = noise(Purpose::Scenery);
         let mut scenery = scenery::build(&mut scenery_noise, &road);
         traffic::add_parked(&mut scenery, &mut scenery_noise, &road);
-        let ego = VehicleState {
-            position_m: road.place(START_M, OWN_LANE_M),
-            yaw_rad: road.at(START_M).heading_rad,
-            ..VehicleState::default()
-        };
+        let ego =
+            Car::at_rest(SEDAN, road.place(START_M, OWN_LANE_M), road.at(START_M).heading_rad);
         let mut world = World {
             traffic: Traffic::new(noise(Purpose::Traffic), &road, START_M),
             driver: Driver::new(noise(Purpose::Driver)),
@@ -82,7 +81,7 @@ impl World {
     fn decide(&mut self) {
         let view = View {
             s_m: self.s_m,
-            ahead: self.traffic.ahead(self.s_m + HALF_LENGTH_M),
+            ahead: self.traffic.ahead(self.s_m + SEDAN.half_length_m),
             oncoming: self.traffic.oncoming_near(self.s_m),
         };
         self.decision = self.driver.decide(&self.road, &self.ego, view);
@@ -93,7 +92,7 @@ impl World {
         self.steps
     }
 
-    pub fn ego(&self) -> &VehicleState {
+    pub fn ego(&self) -> &Car {
         &self.ego
     }
 
@@ -129,7 +128,7 @@ impl World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::vehicle::HALF_WIDTH_M;
+    use crate::world::ego::SEDAN;
 
     #[test]
     fn no_drive_touches_anything_and_each_starts_from_rest_and_brakes() {
@@ -155,8 +154,8 @@ mod tests {
         let mut near = Scene::default();
         near.add_near(&world.scene(), ego.translation, 12.0);
         for i in -10..=10 {
-            for side in [-HALF_WIDTH_M, HALF_WIDTH_M] {
-                let x = HALF_LENGTH_M * f64::from(i) / 10.0;
+            for side in [-SEDAN.half_width_m, SEDAN.half_width_m] {
+                let x = SEDAN.half_length_m * f64::from(i) / 10.0;
                 let point = ego.transform_point3(DVec3::new(x, side, 0.5));
                 for solid in &near.solids {
                     let clear = solid.outside_m(point);

@@ -26,7 +26,12 @@ impl Footprint {
     pub fn corners_m(&self) -> [DVec2; 4] {
         let (along, aside) = (self.forward * self.half_m.x, self.left() * self.half_m.y);
         let centre = self.centre_m;
-        [centre + along + aside, centre - along + aside, centre - along - aside, centre + along - aside]
+        [
+            centre + along + aside,
+            centre - along + aside,
+            centre - along - aside,
+            centre + along - aside,
+        ]
     }
 
     /// Half of the diagonal, m: nothing further from the centre is touched.
@@ -70,7 +75,7 @@ impl Footprint {
     }
 
     /// Half of the rectangle's extent along a unit vector, m.
-    fn reach_m(&self, axis: DVec2) -> f64 {
+    pub fn reach_m(&self, axis: DVec2) -> f64 {
         self.half_m.x * self.forward.dot(axis).abs() + self.half_m.y * self.left().dot(axis).abs()
     }
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{sim::noise::Noise, world::car_following::Idm};
+use crate::{noise::Noise, world::car_following::Idm};
 
 /// Kinds of vehicles in traffic (paper, section III.B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -1,0 +1,23 @@
+//! The world: streets with traffic and people on them, an ego vehicle, and who touches whom.
+//!
+//! ```text
+//! map -> streets ---------------------------------------+
+//! scenario (seed, density) -> vehicles, pedestrians ----+-> world, every 10 ms -> snapshot -> contacts
+//! action -> ego vehicle (bicycle with lag) -------------+
+//! ```
+//!
+//! Agents move every 0.1 s, the ego vehicle every 0.01 s. Every actor draws from a stream of its
+//! own, keyed by (seed, episode, actor), and is visited in the order of its number, so the same
+//! seed gives the same states.
+
+pub mod footprint;
+pub mod ego;
+pub mod car_following;
+pub mod kind;
+pub mod streets;
+pub mod reservation;
+pub mod occupancy;
+pub mod vehicle;
+pub mod traffic;
+pub mod walkers;
+pub mod contact;
