@@ -178,6 +178,11 @@ impl Walker {
         Footprint { centre_m: self.position_m, forward: self.facing, half_m: self.kind.half_m() }
     }
 
+    /// On a street, or on the way across.
+    pub fn is_crossing(&self) -> bool {
+        matches!(self.activity, Activity::Crossing { .. })
+    }
+
     fn stand_on_walk(&mut self, streets: &Streets) {
         let spot = streets.walks[self.walk].course.at(self.s_m);
         self.position_m = spot.position_m + spot.forward.perp() * self.aside_m;

@@ -1,0 +1,107 @@
+//! The state of the world at one instant: what sensors, the expert and the metrics look at.
+
+use glam::DVec2;
+use sha2::{Digest, Sha256};
+
+use crate::world::{
+    ego::Car,
+    footprint::Footprint,
+    kind::{VehicleKind, WalkerKind},
+    reservation::ActorId,
+};
+
+/// Brake lamps come on at this, m/s2.
+pub const BRAKE_LAMPS_MPS2: f64 = -0.6;
+
+/// A vehicle of the traffic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VehicleState {
+    pub id: ActorId,
+    pub kind: VehicleKind,
+    pub footprint: Footprint,
+    pub height_m: f64,
+    pub velocity_mps: DVec2,
+    pub acceleration_mps2: f64,
+    /// Picks a colour, in [0, 1).
+    pub colour: f64,
+}
+
+impl VehicleState {
+    /// Whether its brake lamps are on.
+    pub fn is_braking(&self) -> bool {
+        self.acceleration_mps2 < BRAKE_LAMPS_MPS2 || self.velocity_mps.length() < 0.1
+    }
+}
+
+/// Somebody on foot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WalkerState {
+    pub id: ActorId,
+    pub kind: WalkerKind,
+    pub footprint: Footprint,
+    pub velocity_mps: DVec2,
+    /// Stepped out without looking.
+    pub is_jaywalking: bool,
+    /// On a street, or on the way across.
+    pub is_crossing: bool,
+    /// Picks colours, in [0, 1).
+    pub colour: f64,
+}
+
+/// All that moves, at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    pub time_s: f64,
+    pub ego: Car,
+    /// Ascending by id.
+    pub vehicles: Vec<VehicleState>,
+    /// Ascending by id.
+    pub walkers: Vec<WalkerState>,
+}
+
+impl Snapshot {
+    /// A hash of every number of the state: two worlds that agree in it are the same.
+    pub fn hash(&self) -> u64 {
+        let mut hasher = Sha256::new();
+        let mut add = |values: &[f64]| values.iter().for_each(|v| hasher.update(v.to_le_bytes()));
+        let ego = &self.ego;
+        let [x, y] = ego.position_m.to_array();
+        add(&[self.time_s, x, y, ego.yaw_rad, ego.speed_mps, ego.steer_rad, ego.throttle, ego.brake]);
+        let mut add_body = |id: ActorId, footprint: &Footprint, velocity_mps: DVec2| {
+            let Footprint { centre_m, forward, half_m } = footprint;
+            let pairs = [*centre_m, *forward, *half_m, velocity_mps];
+            add(&[f64::from(id)]);
+            pairs.iter().for_each(|pair| add(&pair.to_array()));
+        };
+        for vehicle in &self.vehicles {
+            add_body(vehicle.id, &vehicle.footprint, vehicle.velocity_mps);
+        }
+        for walker in &self.walkers {
+            add_body(walker.id, &walker.footprint, walker.velocity_mps);
+        }
+        let digest = hasher.finalize();
+        digest.iter().take(8).fold(0, |hash, byte| hash << 8 | u64::from(*byte))
+    }
+
+    /// The same world a share of the way to `next`, for those who move: agents live in steps of
+    /// 0.1 s, and the ego vehicle in between sees them where they are on their way.
+    pub fn towards(&self, next: &Snapshot, share: f64) -> Snapshot {
+        let between = |a: &Footprint, b: &Footprint| Footprint {
+            centre_m: a.centre_m.lerp(b.centre_m, share),
+            forward: a.forward.lerp(b.forward, share).normalize_or(b.forward),
+            half_m: a.half_m,
+        };
+        let vehicles = self.vehicles.iter().zip(&next.vehicles);
+        let walkers = self.walkers.iter().zip(&next.walkers);
+        Snapshot {
+            time_s: self.time_s + (next.time_s - self.time_s) * share,
+            ego: self.ego,
+            vehicles: vehicles
+                .map(|(a, b)| VehicleState { footprint: between(&a.footprint, &b.footprint), ..*b })
+                .collect(),
+            walkers: walkers
+                .map(|(a, b)| WalkerState { footprint: between(&a.footprint, &b.footprint), ..*b })
+                .collect(),
+        }
+    }
+}
