@@ -21,6 +21,7 @@ pub mod log;
 pub mod noise;
 pub mod policy;
 pub mod dataset;
+pub mod map;
 pub mod world;
 pub mod sim;
 #[cfg(feature = "learning")]

@@ -63,9 +63,7 @@ fn lane(map: &RoadMap, id: usize) -> Lane {
 /// Points from one `s` to another, a [`STEP_M`] apart or less.
 fn along(from_m: f64, to_m: f64, place: impl Fn(f64) -> DVec2) -> Vec<DVec2> {
     let steps = ((to_m - from_m).abs() / STEP_M).ceil().max(1.0);
-    (0..=steps as usize)
-        .map(|step| place(from_m + (to_m - from_m) * step as f64 / steps))
-        .collect()
+    (0..=steps as usize).map(|step| place(from_m + (to_m - from_m) * step as f64 / steps)).collect()
 }
 
 /// A walk before its ends are joined: where it is, and on which side of which road.
@@ -100,9 +98,8 @@ fn side_walks(index: usize, road: &Road, section: usize, strips: &mut Vec<Strip>
             continue;
         }
         let (from_m, to_m) = road.section_range_m(section);
-        let points = along(from_m, to_m, |s_m| {
-            road.centre(section, place, s_m).position_m.truncate()
-        });
+        let points =
+            along(from_m, to_m, |s_m| road.centre(section, place, s_m).position_m.truncate());
         let width_m = road.centre(section, place, (from_m + to_m) / 2.0).width_m;
         let half_width_m = (width_m / 2.0 - 0.3).max(0.1);
         strips.extend(strip(index, lane.id > 0, &points, half_width_m));
@@ -188,9 +185,10 @@ fn crosses_street(map: &RoadMap, from: DVec2, to: DVec2) -> bool {
 fn opposite(strips: &[Strip], id: WalkId) -> Option<WalkId> {
     let strip = &strips[id];
     let middle = strip.walk.course.at(strip.walk.course.length_m() / 2.0).position_m;
-    let others = strips.iter().enumerate().filter(|(_, other)| {
-        other.road == strip.road && other.is_left != strip.is_left
-    });
+    let others = strips
+        .iter()
+        .enumerate()
+        .filter(|(_, other)| other.road == strip.road && other.is_left != strip.is_left);
     let distance = |other: &Strip| {
         let (s_m, aside_m) = other.walk.course.project(middle);
         let is_beside = s_m > 0.0 && s_m < other.walk.course.length_m();

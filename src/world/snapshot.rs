@@ -66,7 +66,16 @@ impl Snapshot {
         let mut add = |values: &[f64]| values.iter().for_each(|v| hasher.update(v.to_le_bytes()));
         let ego = &self.ego;
         let [x, y] = ego.position_m.to_array();
-        add(&[self.time_s, x, y, ego.yaw_rad, ego.speed_mps, ego.steer_rad, ego.throttle, ego.brake]);
+        add(&[
+            self.time_s,
+            x,
+            y,
+            ego.yaw_rad,
+            ego.speed_mps,
+            ego.steer_rad,
+            ego.throttle,
+            ego.brake,
+        ]);
         let mut add_body = |id: ActorId, footprint: &Footprint, velocity_mps: DVec2| {
             let Footprint { centre_m, forward, half_m } = footprint;
             let pairs = [*centre_m, *forward, *half_m, velocity_mps];

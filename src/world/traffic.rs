@@ -130,6 +130,17 @@ impl Traffic {
         self.change_lanes(streets);
     }
 
+    /// The next body along a way of lanes, as of the last step.
+    pub fn ahead(
+        &self,
+        streets: &Streets,
+        way: impl Iterator<Item = LaneId>,
+        asker: Asker,
+        horizon_m: f64,
+    ) -> Option<Ahead> {
+        self.occupancy.ahead(streets, way, asker, horizon_m)
+    }
+
     fn place_bodies(&mut self, streets: &Streets, ego: Option<&EgoOnLanes>) {
         self.occupancy.clear(streets.lanes.len());
         for vehicle in &self.vehicles {

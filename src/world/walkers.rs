@@ -2,6 +2,7 @@
 //! none.
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     noise::Noise,
@@ -83,7 +84,7 @@ struct Landing {
 }
 
 /// Steps out on the street, counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crossings {
     pub careful: u64,
     pub without_notice: u64,

@@ -8,11 +8,13 @@ use crate::{
     noise::{Noise, Purpose},
     policy::Action,
     world::{
+        car_following::Ahead,
         contact::{Body, Contact, Other, contact},
         density::Counts,
         ego::{self, Car},
+        footprint::Footprint,
         obstacles::Obstacles,
-        occupancy::Occupant,
+        occupancy::{Asker, Occupant},
         reservation::ActorId,
         route::Route,
         snapshot::{Snapshot, VehicleState, WalkerState},
@@ -125,7 +127,8 @@ impl World {
         self.traffic.step(&self.streets, Some(&announced), &hazards);
         self.walkers.step(&self.streets, &seen);
         let time_s = (self.steps + SUBSTEPS) as f64 * ego::STEP_S;
-        self.before = std::mem::replace(&mut self.after, self.agents(time_s));
+        let next = self.agents(time_s);
+        self.before = std::mem::replace(&mut self.after, next);
     }
 
     /// Agents as they are after their last step.
@@ -189,6 +192,14 @@ impl World {
         self.traffic.reservations.may_enter(EGO, lane)
     }
 
+    /// What is ahead of the ego vehicle on the lanes of its route, those that merge into them too.
+    pub fn ahead_of_ego(&self, horizon_m: f64) -> Option<Ahead> {
+        let (way, s_m) = self.route.lanes_ahead(self.progress_m, horizon_m);
+        let half_length_m = self.ego.config.half_length_m;
+        let asker = Asker { actor: EGO, s_m, half_length_m };
+        self.traffic.ahead(&self.streets, way.into_iter(), asker, horizon_m)
+    }
+
     fn touch(&self) -> Option<Contact> {
         let footprint = self.ego.footprint();
         let ego = Body {
@@ -202,10 +213,10 @@ impl World {
         let near = |a: &DVec2, b: &DVec2| {
             a.lerp(*b, share).distance_squared(footprint.centre_m) < NEAR_M * NEAR_M
         };
-        let now = |a: &crate::world::footprint::Footprint, b: &crate::world::footprint::Footprint| {
+        let now = |a: &Footprint, b: &Footprint| {
             let centre_m = a.centre_m.lerp(b.centre_m, share);
             let forward = a.forward.lerp(b.forward, share).normalize_or(b.forward);
-            crate::world::footprint::Footprint { centre_m, forward, ..*b }
+            Footprint { centre_m, forward, ..*b }
         };
         let vehicles = self.before.vehicles.iter().zip(&self.after.vehicles);
         let vehicles = vehicles

@@ -1,0 +1,73 @@
+//! A drive from start to end: goal, contact, or out of time.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    policy::Action,
+    world::{
+        contact::Contact,
+        scoring::Sums,
+        world::{SUBSTEPS, World},
+    },
+};
+
+/// The goal is reached this near to it, m (PAPER.md U30).
+pub const GOAL_M: f64 = 5.0;
+
+/// Time limit: the route at this speed, and then some (PAPER.md U29).
+pub const SLOWEST_MPS: f64 = 10.0 / 3.6;
+pub const GRACE_S: f64 = 20.0;
+
+/// Further from the route than this the drive is over, m.
+pub const OFF_ROUTE_M: f64 = 30.0;
+
+/// How a drive ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "end", rename_all = "kebab-case")]
+pub enum End {
+    Goal,
+    Contact(Contact),
+    Timeout,
+    OffRoute,
+}
+
+/// A drive, over.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    pub end: End,
+    pub route_m: f64,
+    pub progress_m: f64,
+    pub sums: Sums,
+}
+
+/// Let a driver drive; it is asked every 0.1 s.
+pub fn drive(world: &mut World, driver: &mut dyn FnMut(&World) -> Action) -> Outcome {
+    let route = world.route.clone();
+    let limit_s = route.length_m() / SLOWEST_MPS + GRACE_S;
+    let mut sums = Sums::default();
+    let end = loop {
+        let action = driver(world);
+        for _ in 0..SUBSTEPS {
+            world.step(action);
+            if world.contact().is_some() {
+                break;
+            }
+        }
+        let (ego, progress_m) = (world.ego(), world.progress_m());
+        sums.add(&world.streets, &route, progress_m, ego);
+        if let Some(contact) = world.contact() {
+            break End::Contact(*contact);
+        }
+        let left_m = route.length_m() - progress_m;
+        if left_m < GOAL_M && ego.position_m.distance(route.goal_m()) < GOAL_M {
+            break End::Goal;
+        }
+        if route.at(progress_m).position_m.distance(ego.position_m) > OFF_ROUTE_M {
+            break End::OffRoute;
+        }
+        if world.time_s() > limit_s {
+            break End::Timeout;
+        }
+    };
+    Outcome { end, route_m: route.length_m(), progress_m: world.progress_m(), sums }
+}
