@@ -12,6 +12,7 @@ use crate::{
         footprint::Footprint,
         route::{Route, Waypoint},
         snapshot::Snapshot,
+        streets::LEVEL_M,
         traffic::STEP_S,
         world::World,
     },
@@ -201,8 +202,13 @@ impl Expert {
         let near = |footprint: &Footprint| {
             footprint.centre_m.distance(ego.position_m) < reach_m + footprint.half_m.x + 10.0
         };
-        let vehicles: Vec<_> = snapshot.vehicles.iter().filter(|v| near(&v.footprint)).collect();
-        let walkers: Vec<_> = snapshot.walkers.iter().filter(|w| near(&w.footprint)).collect();
+        let is_level = |ground_m: f64| (ground_m - snapshot.ego_ground_m).abs() < LEVEL_M;
+        let vehicles =
+            snapshot.vehicles.iter().filter(|v| is_level(v.ground_m) && near(&v.footprint));
+        let vehicles: Vec<_> = vehicles.collect();
+        let walkers =
+            snapshot.walkers.iter().filter(|w| is_level(w.ground_m) && near(&w.footprint));
+        let walkers: Vec<_> = walkers.collect();
         let route = &world.route;
         let mut ahead_m = half_m.x;
         while ahead_m < reach_m.min(HORIZON_M) {

@@ -6,7 +6,7 @@ use crate::{
     frame::Command,
     world::{
         route::{Route, Waypoint},
-        streets::{LaneId, Streets},
+        streets::{LaneId, Spot, Streets},
     },
 };
 
@@ -27,6 +27,7 @@ const STRAIGHT_RAD: f64 = 0.5;
 #[derive(Clone, Copy)]
 struct Place {
     position_m: DVec2,
+    height_m: f64,
     lane: LaneId,
     s_m: f64,
 }
@@ -80,15 +81,16 @@ fn stretch(streets: &Streets, beside: &[LaneId], from_m: f64, to_m: f64, places:
         let at = |index: usize| {
             let lane = &streets.lanes[beside[index]];
             let s_m = first.beside_m(s_m, lane);
-            (lane.course.at(s_m).position_m, s_m)
+            (lane.course.at(s_m), s_m)
         };
         let (here, here_s) = at(now);
         let place = if share > 0.0 {
             let (there, there_s) = at(now + 1);
-            let position_m = here.lerp(there, smooth);
-            Place { position_m, lane: beside[now + 1], s_m: there_s }
+            let position_m = here.position_m.lerp(there.position_m, smooth);
+            Place { position_m, height_m: there.height_m, lane: beside[now + 1], s_m: there_s }
         } else {
-            Place { position_m: here, lane: beside[now], s_m: here_s }
+            let Spot { position_m, height_m, .. } = here;
+            Place { position_m, height_m, lane: beside[now], s_m: here_s }
         };
         places.push(place);
     }
@@ -107,6 +109,7 @@ fn evenly(places: &[Place], streets: &Streets) -> Vec<Waypoint> {
             let lane = &streets.lanes[nearer.lane];
             waypoints.push(Waypoint {
                 position_m: pair[0].position_m.lerp(pair[1].position_m, share),
+                height_m: nearer.height_m,
                 at_m: next_m,
                 lane: nearer.lane,
                 s_m: nearer.s_m,

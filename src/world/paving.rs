@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
     map::{
@@ -52,7 +52,7 @@ pub fn pave(map: &RoadMap) -> Streets {
 fn lane(map: &RoadMap, id: usize) -> Lane {
     let graph_lane = map.lane(id);
     let (from_m, to_m) = (graph_lane.entry_m(), graph_lane.exit_m());
-    let points = along(from_m, to_m, |s_m| map.centre(id, s_m).position_m.truncate());
+    let points = along(from_m, to_m, |s_m| map.centre(id, s_m).position_m);
     let middle_m = (from_m + to_m) / 2.0;
     let key = graph_lane.key;
     let limit_mps = map.road(id).speed_limit_mps(key.section, key.lane, middle_m);
@@ -61,7 +61,7 @@ fn lane(map: &RoadMap, id: usize) -> Lane {
 }
 
 /// Points from one `s` to another, a [`STEP_M`] apart or less.
-fn along(from_m: f64, to_m: f64, place: impl Fn(f64) -> DVec2) -> Vec<DVec2> {
+fn along(from_m: f64, to_m: f64, place: impl Fn(f64) -> DVec3) -> Vec<DVec3> {
     let steps = ((to_m - from_m).abs() / STEP_M).ceil().max(1.0);
     (0..=steps as usize).map(|step| place(from_m + (to_m - from_m) * step as f64 / steps)).collect()
 }
@@ -98,8 +98,7 @@ fn side_walks(index: usize, road: &Road, section: usize, strips: &mut Vec<Strip>
             continue;
         }
         let (from_m, to_m) = road.section_range_m(section);
-        let points =
-            along(from_m, to_m, |s_m| road.centre(section, place, s_m).position_m.truncate());
+        let points = along(from_m, to_m, |s_m| road.centre(section, place, s_m).position_m);
         let width_m = road.centre(section, place, (from_m + to_m) / 2.0).width_m;
         let half_width_m = (width_m / 2.0 - 0.3).max(0.1);
         strips.extend(strip(index, lane.id > 0, &points, half_width_m));
@@ -123,13 +122,13 @@ fn verges(index: usize, road: &Road, section: usize, strips: &mut Vec<Strip>) {
                 true => borders.inner_t_m.max(borders.outer_t_m) + VERGE_M,
                 false => borders.inner_t_m.min(borders.outer_t_m) - VERGE_M,
             };
-            road.place(s_m, t_m).truncate()
+            road.place(s_m, t_m)
         });
         strips.extend(strip(index, is_left, &points, VERGE_HALF_M));
     }
 }
 
-fn strip(road: usize, is_left: bool, points: &[DVec2], half_width_m: f64) -> Option<Strip> {
+fn strip(road: usize, is_left: bool, points: &[DVec3], half_width_m: f64) -> Option<Strip> {
     let course = Course::through(points);
     let is_long = course.length_m() >= SHORTEST_M;
     let onward = [Vec::new(), Vec::new()];

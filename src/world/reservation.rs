@@ -22,6 +22,8 @@ pub struct Claim {
     pub is_taken: bool,
     /// Whether there is room behind the junction now.
     pub has_room: bool,
+    /// The vehicle needs more room than a car does.
+    pub is_wide: bool,
     /// The lane of these that the vehicle is on, and the arc length of its rear there, m; before
     /// the junction the first, negative.
     pub rear: (usize, f64),
@@ -37,7 +39,8 @@ impl Claim {
     /// Whether two ways cross where both still have to pass.
     fn crosses(&self, other: &Claim, streets: &Streets) -> bool {
         self.lanes.iter().enumerate().any(|(index, lane)| {
-            streets.conflicts(*lane).iter().any(|conflict| {
+            let conflicts = streets.conflicts(*lane).iter();
+            conflicts.filter(|c| !c.is_wide || self.is_wide || other.is_wide).any(|conflict| {
                 let theirs = other.lanes.iter().position(|lane| *lane == conflict.with);
                 theirs.is_some_and(|theirs| {
                     let back = streets.conflicts(conflict.with).iter().find(|c| c.with == *lane);
@@ -57,7 +60,14 @@ pub struct Reservations {
 
 impl Reservations {
     /// Ask for a way, unless the actor has asked for one that begins there already.
-    pub fn ask(&mut self, actor: ActorId, lanes: &[LaneId], step: u64, is_inside: bool) {
+    pub fn ask(
+        &mut self,
+        actor: ActorId,
+        is_wide: bool,
+        lanes: &[LaneId],
+        step: u64,
+        is_inside: bool,
+    ) {
         let has_asked =
             |claim: &Claim| claim.actor == actor && claim.lanes.first() == lanes.first();
         if self.claims.iter().any(has_asked) {
@@ -69,6 +79,7 @@ impl Reservations {
             since: step,
             is_taken: is_inside,
             has_room: false,
+            is_wide,
             rear: (0, f64::NEG_INFINITY),
         });
     }

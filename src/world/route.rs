@@ -8,6 +8,8 @@ use crate::{frame::Command, world::streets::LaneId};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
     pub position_m: DVec2,
+    /// Of the ground.
+    pub height_m: f64,
     /// From the start of the route, m.
     pub at_m: f64,
     /// The lane that it belongs to; in the middle of a lane change that of the target.

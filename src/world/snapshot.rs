@@ -19,6 +19,8 @@ pub struct VehicleState {
     pub id: ActorId,
     pub kind: VehicleKind,
     pub footprint: Footprint,
+    /// Of the ground below it.
+    pub ground_m: f64,
     pub height_m: f64,
     pub velocity_mps: DVec2,
     pub acceleration_mps2: f64,
@@ -39,6 +41,8 @@ pub struct WalkerState {
     pub id: ActorId,
     pub kind: WalkerKind,
     pub footprint: Footprint,
+    /// Of the ground below.
+    pub ground_m: f64,
     pub velocity_mps: DVec2,
     /// Stepped out without looking.
     pub is_jaywalking: bool,
@@ -53,6 +57,8 @@ pub struct WalkerState {
 pub struct Snapshot {
     pub time_s: f64,
     pub ego: Car,
+    /// Of the ground below the ego vehicle.
+    pub ego_ground_m: f64,
     /// Ascending by id.
     pub vehicles: Vec<VehicleState>,
     /// Ascending by id.
@@ -105,6 +111,7 @@ impl Snapshot {
         Snapshot {
             time_s: self.time_s + (next.time_s - self.time_s) * share,
             ego: self.ego,
+            ego_ground_m: self.ego_ground_m,
             vehicles: vehicles
                 .map(|(a, b)| VehicleState { footprint: between(&a.footprint, &b.footprint), ..*b })
                 .collect(),

@@ -2,7 +2,7 @@
 //!
 //! Made once from a map; afterwards a look-up is an index and a line between two points.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// Distance between two points of a lane or a walk, m, nearly: lengths are whole multiples.
 pub const STEP_M: f64 = 1.0;
@@ -17,6 +17,8 @@ pub type WalkId = usize;
 #[derive(Clone, Debug)]
 pub struct Course {
     points_m: Vec<DVec2>,
+    /// Of the ground at the points.
+    heights_m: Vec<f64>,
     step_m: f64,
 }
 
@@ -26,12 +28,18 @@ pub struct Spot {
     pub position_m: DVec2,
     /// Unit vector along the course.
     pub forward: DVec2,
+    /// Height of the ground, m.
+    pub height_m: f64,
 }
 
+/// What differs in height by more than this is on another level: a bridge and what is below it, m.
+pub const LEVEL_M: f64 = 2.5;
+
 impl Course {
-    /// Through points of any spacing; at least two that differ.
-    pub fn through(points_m: &[DVec2]) -> Course {
-        let lengths: Vec<f64> = points_m.windows(2).map(|w| w[0].distance(w[1])).collect();
+    /// Through points on the ground, of any spacing; at least two that differ.
+    pub fn through(points_m: &[DVec3]) -> Course {
+        let flat = |w: &[DVec3]| w[0].truncate().distance(w[1].truncate());
+        let lengths: Vec<f64> = points_m.windows(2).map(flat).collect();
         let total: f64 = lengths.iter().sum();
         let steps = (total / STEP_M).round().max(1.0);
         let step_m = total / steps;
@@ -47,7 +55,8 @@ impl Course {
             even.push(points_m[piece].lerp(points_m[piece + 1], fraction));
         }
         even.extend(points_m.last());
-        Course { points_m: even, step_m }
+        let heights_m = even.iter().map(|point| point.z).collect();
+        Course { points_m: even.iter().map(|point| point.truncate()).collect(), heights_m, step_m }
     }
 
     pub fn length_m(&self) -> f64 {
@@ -64,7 +73,13 @@ impl Course {
         let index = (place.max(0.0) as usize).min(self.points_m.len() - 2);
         let (from, to) = (self.points_m[index], self.points_m[index + 1]);
         let position_m = from + (to - from) * (place - index as f64);
-        Spot { position_m, forward: (to - from) / self.step_m.max(1e-9) }
+        let share = (place - index as f64).clamp(0.0, 1.0);
+        let (low_m, high_m) = (self.heights_m[index], self.heights_m[index + 1]);
+        Spot {
+            position_m,
+            forward: (to - from) / self.step_m.max(1e-9),
+            height_m: low_m + (high_m - low_m) * share,
+        }
     }
 
     /// Arc length of the nearest point and the distance from it, positive left, m.
@@ -156,6 +171,8 @@ pub struct Conflict {
     /// Arc lengths on the own lane from and to which bodies could meet, m.
     pub from_m: f64,
     pub to_m: f64,
+    /// Only bodies that need more room than a car does in a bend could meet.
+    pub is_wide: bool,
 }
 
 /// Lanes that lead through one junction.
@@ -201,8 +218,13 @@ pub struct Streets {
     cells: Cells,
 }
 
-/// Lanes nearer than this to each other are in each other's way, for vehicles of usual width, m.
+/// Lanes nearer than this to each other are in each other's way, for cars, and for what is long or
+/// wide, where the lanes do not run side by side, m.
 const CONFLICT_M: f64 = 2.6;
+const WIDE_CONFLICT_M: f64 = 4.2;
+
+/// Lanes whose directions differ by less run side by side, rad.
+const PARALLEL_RAD: f64 = 0.35;
 
 impl Streets {
     /// Put lanes and walks together; `next` of the lanes is what leads where.
@@ -236,7 +258,7 @@ impl Streets {
         for (a, lane) in self.lanes.iter().enumerate() {
             for &from in &lane.previous {
                 for &b in self.lanes[from].next.iter().filter(|b| **b != a) {
-                    let together = self.overlap(a, b).map_or(0.0, |(_, to_m)| to_m);
+                    let together = self.overlap(a, b, CONFLICT_M).map_or(0.0, |(_, to_m)| to_m);
                     self.siblings[a].push((b, together));
                 }
             }
@@ -251,24 +273,35 @@ impl Streets {
                     } else if !shares(&lane.previous, &other.previous)
                         && !lane.next.contains(&b)
                         && !other.next.contains(&a)
-                        && let Some((from_m, to_m)) = self.overlap(a, b)
                     {
-                        self.conflicts[a].push(Conflict { with: b, from_m, to_m });
+                        let conflict = self.conflict(a, b);
+                        self.conflicts[a].extend(conflict);
                     }
                 }
             }
         }
     }
 
-    /// The stretch of lane `a` that is nearer than [`CONFLICT_M`] to lane `b`.
-    fn overlap(&self, a: LaneId, b: LaneId) -> Option<(f64, f64)> {
+    fn conflict(&self, a: LaneId, b: LaneId) -> Option<Conflict> {
+        if let Some((from_m, to_m)) = self.overlap(a, b, CONFLICT_M) {
+            return Some(Conflict { with: b, from_m, to_m, is_wide: false });
+        }
+        let (from_m, to_m) = self.overlap(a, b, WIDE_CONFLICT_M)?;
+        let here = self.lanes[a].course.at((from_m + to_m) / 2.0);
+        let (there_m, _) = self.lanes[b].course.project(here.position_m);
+        let turn_rad = here.forward.angle_to(self.lanes[b].course.at(there_m).forward).abs();
+        let is_wide = true;
+        (turn_rad > PARALLEL_RAD).then_some(Conflict { with: b, from_m, to_m, is_wide })
+    }
+
+    /// The stretch of lane `a` that is nearer than `near_m` to lane `b`.
+    fn overlap(&self, a: LaneId, b: LaneId, near_m: f64) -> Option<(f64, f64)> {
         let (a, b) = (&self.lanes[a].course, &self.lanes[b].course);
-        let near =
-            |p: &DVec2| b.points_m.iter().any(|q| p.distance_squared(*q) < CONFLICT_M.powi(2));
+        let near = |p: &DVec2| b.points_m.iter().any(|q| p.distance_squared(*q) < near_m.powi(2));
         let first = a.points_m.iter().position(near)?;
         let last = a.points_m.iter().rposition(near)?;
         let s_m = |index: usize| index as f64 * a.step_m;
-        Some(((s_m(first) - CONFLICT_M / 2.0).max(0.0), s_m(last) + CONFLICT_M / 2.0))
+        Some(((s_m(first) - near_m / 2.0).max(0.0), s_m(last) + near_m / 2.0))
     }
 
     /// Lanes that cross `lane` inside its junction.

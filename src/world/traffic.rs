@@ -9,7 +9,7 @@ use crate::{
         footprint::Footprint,
         occupancy::{Asker, Occupancy, Occupant},
         reservation::{ActorId, Claim, Reservations},
-        streets::{LaneId, Streets},
+        streets::{LEVEL_M, LaneId, Streets},
         vehicle::Vehicle,
     },
 };
@@ -33,8 +33,14 @@ const LINE_M: f64 = 0.5;
 /// line would still be comfortable, m.
 const ASK_M: f64 = 20.0;
 
+/// Longer than twice this, a vehicle needs more room in bends than cars do, m.
+const WIDE_M: f64 = 3.2;
+
 /// Least room behind a junction, beyond the own length, m.
 const ROOM_M: f64 = 3.0;
+
+/// How long drivers wait for room before they think of another way, s.
+const PATIENCE_S: f64 = 12.0;
 
 /// Between the side of a vehicle and somebody on foot, m.
 const CLEARANCE_M: f64 = 0.5;
@@ -48,6 +54,8 @@ pub struct Hazard {
     pub position_m: DVec2,
     pub velocity_mps: DVec2,
     pub radius_m: f64,
+    /// Of the ground below.
+    pub height_m: f64,
 }
 
 /// What traffic knows of the ego vehicle.
@@ -83,10 +91,13 @@ impl Traffic {
         actor: impl Fn(ActorId) -> Noise,
     ) -> Traffic {
         const HEADWAY_M: f64 = 16.0;
+        /// More than one vehicle on so much lane is a jam from the start, m.
+        const LANE_EACH_M: f64 = 32.0;
         let mut traffic = Traffic::default();
         traffic.occupancy.clear(streets.lanes.len());
         let lengths: Vec<f64> = streets.lanes.iter().map(usable_m).collect();
         let total: f64 = lengths.iter().sum();
+        let count = count.min((total / LANE_EACH_M) as usize);
         for _ in 0..40 * count {
             if traffic.vehicles.len() == count || total <= 0.0 {
                 break;
@@ -128,6 +139,7 @@ impl Traffic {
             vehicle.advance(streets, acceleration, STEP_S);
         }
         self.change_lanes(streets);
+        self.look_for_other_ways(streets);
     }
 
     /// The next body along a way of lanes, as of the last step.
@@ -187,9 +199,12 @@ impl Traffic {
             if let Some((lanes, distance_m)) = way.through(streets)
                 && distance_m < way.ask_m
             {
-                self.reservations.ask(way.actor, &lanes, step, distance_m <= 0.0);
+                let is_wide = way.half_length_m > WIDE_M;
+                self.reservations.ask(way.actor, is_wide, &lanes, step, distance_m <= 0.0);
             }
-            let room = |lanes: &[LaneId]| self.has_room(streets, way, lanes);
+            let may_go = |lanes: &[LaneId]| {
+                self.is_at_the_head(way, lanes) && self.has_room(streets, way, lanes)
+            };
             let updates: Vec<(usize, (usize, f64), bool)> = self
                 .reservations
                 .claims()
@@ -199,7 +214,7 @@ impl Traffic {
                 .map(|(index, claim)| {
                     let at = claim.lanes.iter().position(|lane| *lane == way.lanes[0]);
                     let rear = at.map_or((0, f64::NEG_INFINITY), |at| (at, rear_m));
-                    (index, rear, claim.is_taken || room(&claim.lanes))
+                    (index, rear, claim.is_taken || may_go(&claim.lanes))
                 })
                 .collect();
             for (index, rear, has_room) in updates {
@@ -209,6 +224,20 @@ impl Traffic {
             }
         }
         self.reservations.settle(streets);
+    }
+
+    /// Whether all who are between an actor and its junction may enter themselves: a way that is
+    /// taken by somebody who cannot move would be lost to all.
+    fn is_at_the_head(&self, way: &Way, through: &[LaneId]) -> bool {
+        let before = way.lanes.iter().take_while(|lane| Some(*lane) != through.first());
+        let has_way = |actor: ActorId| {
+            self.reservations.claims().iter().any(|claim| claim.actor == actor && claim.is_taken)
+        };
+        before.enumerate().all(|(index, lane)| {
+            let from_m = if index == 0 { way.s_m } else { f64::NEG_INFINITY };
+            let mut ahead = self.occupancy.on(*lane).iter().filter(|body| body.s_m > from_m);
+            ahead.all(|body| body.actor == way.actor || has_way(body.actor))
+        })
     }
 
     /// Whether a vehicle could stand behind the junction, with all who are on their way there.
@@ -261,6 +290,20 @@ impl Traffic {
         let last = vehicle.way().last()?;
         (start_m < HORIZON_M && streets.lanes[last].next.is_empty())
             .then(|| Ahead::standing(start_m - vehicle.half_m.x))
+    }
+
+    /// Whoever has stood before a full street for long takes another one, if there is any.
+    fn look_for_other_ways(&mut self, streets: &Streets) {
+        for vehicle in &mut self.vehicles {
+            let waits =
+                |claim: &Claim| claim.actor == vehicle.id && !claim.is_taken && !claim.has_room;
+            let for_long = vehicle.standing_s > PATIENCE_S
+                && (vehicle.standing_s / STEP_S).round() as u64 % (PATIENCE_S / STEP_S) as u64 == 0;
+            if for_long && self.reservations.claims().iter().any(waits) {
+                self.reservations.forget(vehicle.id, &[]);
+                vehicle.plan_anew(streets);
+            }
+        }
     }
 
     fn change_lanes(&mut self, streets: &Streets) {
@@ -411,7 +454,8 @@ fn hazard_ahead(streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> Opt
     let here = vehicle.spot(streets, 0.0);
     let is_near = |hazard: &&Hazard| {
         let from = hazard.position_m - here.position_m;
-        from.length() < reach_m + 10.0 && from.dot(here.forward) > -vehicle.half_m.x
+        let is_level = (hazard.height_m - here.height_m).abs() < LEVEL_M;
+        is_level && from.length() < reach_m + 10.0 && from.dot(here.forward) > -vehicle.half_m.x
     };
     let near: Vec<&Hazard> = hazards.iter().filter(is_near).collect();
     if near.is_empty() {
@@ -464,9 +508,9 @@ mod tests {
         let lane = |quarter: usize| {
             let at = |i: i32| {
                 let angle = (quarter as f64 + f64::from(i) / 250.0) * std::f64::consts::FRAC_PI_2;
-                radius_m * DVec2::from_angle(angle)
+                (radius_m * DVec2::from_angle(angle)).extend(0.0)
             };
-            let points: Vec<DVec2> = (0..=250).map(at).collect();
+            let points: Vec<_> = (0..=250).map(at).collect();
             let course = Course::through(&points);
             let mut lane = Lane::new(format!("{quarter}/0/-1"), course, 3.5, LIMIT_MPS);
             lane.next = vec![(quarter + 1) % 4];
@@ -523,7 +567,7 @@ mod tests {
         let vehicle = &traffic.vehicles[0];
         let stop_m = vehicle.half_m.x + vehicle.speed_mps.powi(2) / (2.0 * 4.0) + 3.0;
         let position_m = vehicle.spot(&streets, stop_m).position_m;
-        let hazard = Hazard { position_m, velocity_mps: DVec2::ZERO, radius_m: 0.3 };
+        let hazard = Hazard { position_m, velocity_mps: DVec2::ZERO, radius_m: 0.3, height_m: 0.0 };
         for _ in 0..100 {
             traffic.step(&streets, None, &[hazard]);
             let footprint = traffic.vehicles[0].footprint(&streets);

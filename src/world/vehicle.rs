@@ -116,6 +116,12 @@ impl Vehicle {
         }
     }
 
+    /// Choose another way from here on.
+    pub fn plan_anew(&mut self, streets: &Streets) {
+        self.plan.clear();
+        self.make_plan(streets);
+    }
+
     /// Go over to a neighbouring lane; the body follows.
     pub fn change_lane(&mut self, streets: &Streets, to: LaneId) {
         let (from, target) = (&streets.lanes[self.lane], &streets.lanes[to]);

@@ -10,7 +10,7 @@ use crate::{
         footprint::Footprint,
         kind::WalkerKind,
         reservation::ActorId,
-        streets::{Streets, WalkId},
+        streets::{LEVEL_M, Streets, WalkId},
         traffic::{Hazard, STEP_S},
     },
 };
@@ -46,6 +46,8 @@ pub struct Walker {
     /// Picks colours, in [0, 1).
     pub colour: f64,
     pub position_m: DVec2,
+    /// Of the ground below.
+    pub height_m: f64,
     pub velocity_mps: DVec2,
     /// Unit vector that the body faces.
     pub facing: DVec2,
@@ -101,6 +103,7 @@ pub struct Walkers {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     pub footprint: Footprint,
+    pub height_m: f64,
     pub speed_mps: f64,
 }
 
@@ -144,6 +147,7 @@ impl Walkers {
             position_m: walker.position_m,
             velocity_mps: walker.velocity_mps,
             radius_m: walker.kind.half_m().y,
+            height_m: walker.height_m,
         })
     }
 }
@@ -160,6 +164,7 @@ impl Walker {
             pace_mps,
             colour: noise.uniform(0.0, 1.0),
             position_m: DVec2::ZERO,
+            height_m: 0.0,
             velocity_mps: DVec2::ZERO,
             facing: DVec2::X,
             is_jaywalking: false,
@@ -187,10 +192,20 @@ impl Walker {
     fn stand_on_walk(&mut self, streets: &Streets) {
         let spot = streets.walks[self.walk].course.at(self.s_m);
         self.position_m = spot.position_m + spot.forward.perp() * self.aside_m;
+        self.height_m = spot.height_m;
         self.facing = if self.backwards { -spot.forward } else { spot.forward };
     }
 
     fn step(&mut self, streets: &Streets, vehicles: &[Seen], crossings: &mut Crossings) {
+        let is_near = |seen: &&Seen| {
+            (seen.height_m - self.height_m).abs() < LEVEL_M
+                && seen.footprint.centre_m.distance_squared(self.position_m) < SIGHT_M * SIGHT_M
+        };
+        let near: Vec<Seen> = match self.activity {
+            Activity::Walking => Vec::new(),
+            _ => vehicles.iter().filter(is_near).copied().collect(),
+        };
+        let vehicles = &near[..];
         match self.activity {
             Activity::Walking => self.walk_on(streets, crossings),
             Activity::Waiting { to, since_s } => {
@@ -287,20 +302,25 @@ impl Walker {
         }
         self.facing = left.normalize();
         let next_m = self.position_m + self.facing * step_m;
-        // Nobody walks into the side of what stands or passes right before them.
+        // Nobody walks into the side of what stands or passes right before them: what passes is
+        // let by, what stands is walked round, by its nearer end.
+        const ARM_M: f64 = 0.45;
+        let (here_m, position_m) = (self.position_m, next_m);
         let in_way = |seen: &&Seen| {
-            let near = seen.footprint.grown(0.45);
-            near.distance_m(next_m) <= 0.0 && near.distance_m(self.position_m) > 0.0
-                || near.distance_m(next_m) <= 0.0
-                    && seen.footprint.distance_m(next_m)
-                        < seen.footprint.distance_m(self.position_m)
+            let distance_m = seen.footprint.distance_m(position_m);
+            distance_m < ARM_M && distance_m < seen.footprint.distance_m(here_m)
         };
-        if vehicles.iter().any(|seen| in_way(&seen)) {
-            self.velocity_mps = DVec2::ZERO;
-            return;
-        }
+        let next_m = match vehicles.iter().find(in_way) {
+            None => next_m,
+            Some(seen) if seen.speed_mps > 0.3 => here_m,
+            Some(seen) => {
+                let forward = seen.footprint.forward;
+                let along = forward.dot(here_m - seen.footprint.centre_m).signum() * forward;
+                here_m + along * step_m
+            }
+        };
+        self.velocity_mps = (next_m - here_m) / STEP_S;
         self.position_m = next_m;
-        self.velocity_mps = self.facing * self.pace_mps;
     }
 }
 
@@ -311,9 +331,6 @@ fn has_gap(from_m: DVec2, to_m: DVec2, needed_s: f64, vehicles: &[Seen]) -> bool
     vehicles.iter().all(|seen| {
         let footprint = &seen.footprint;
         let from = footprint.centre_m - from_m;
-        if from.length() > SIGHT_M {
-            return true;
-        }
         // Standing on the line, or right before it.
         let reach_m = footprint.radius_m() + 0.5;
         let is_between = |point: DVec2| {

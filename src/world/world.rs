@@ -18,7 +18,7 @@ use crate::{
         reservation::ActorId,
         route::Route,
         snapshot::{Snapshot, VehicleState, WalkerState},
-        streets::{LaneId, Streets},
+        streets::{LEVEL_M, LaneId, Streets},
         traffic::{EGO, EgoOnLanes, Hazard, STEP_S, Traffic},
         walkers::{Seen, Walkers},
     },
@@ -76,7 +76,13 @@ impl World {
         let traffic =
             Traffic::spawn(&streets, vehicles, ego.position_m, CLEAR_M, &mut noise, actor);
         let walkers = Walkers::spawn(&streets, counts.walkers, &mut noise, actor);
-        let empty = Snapshot { time_s: 0.0, ego, vehicles: Vec::new(), walkers: Vec::new() };
+        let empty = Snapshot {
+            time_s: 0.0,
+            ego,
+            ego_ground_m: route.at(0.0).height_m,
+            vehicles: Vec::new(),
+            walkers: Vec::new(),
+        };
         let mut world = World {
             streets,
             route,
@@ -116,14 +122,22 @@ impl World {
     fn step_agents(&mut self) {
         let announced = self.ego_on_lanes();
         let mut hazards: Vec<Hazard> = self.walkers.hazards().collect();
-        hazards.extend(discs(&self.ego));
+        hazards.extend(discs(&self.ego, self.ground_m()));
         let mut seen: Vec<Seen> = self
             .after
             .vehicles
             .iter()
-            .map(|v| Seen { footprint: v.footprint, speed_mps: v.velocity_mps.length() })
+            .map(|v| Seen {
+                footprint: v.footprint,
+                height_m: v.ground_m,
+                speed_mps: v.velocity_mps.length(),
+            })
             .collect();
-        seen.push(Seen { footprint: self.ego.footprint(), speed_mps: self.ego.speed_mps });
+        seen.push(Seen {
+            footprint: self.ego.footprint(),
+            height_m: self.ground_m(),
+            speed_mps: self.ego.speed_mps,
+        });
         self.traffic.step(&self.streets, Some(&announced), &hazards);
         self.walkers.step(&self.streets, &seen);
         let time_s = (self.steps + SUBSTEPS) as f64 * ego::STEP_S;
@@ -139,6 +153,7 @@ impl World {
                 id: vehicle.id,
                 kind: vehicle.model.kind,
                 footprint,
+                ground_m: vehicle.spot(&self.streets, 0.0).height_m,
                 height_m: vehicle.height_m,
                 velocity_mps: vehicle.velocity_mps(&footprint),
                 acceleration_mps2: vehicle.acceleration_mps2,
@@ -149,6 +164,7 @@ impl World {
             id: walker.id,
             kind: walker.kind,
             footprint: walker.footprint(),
+            ground_m: walker.height_m,
             velocity_mps: walker.velocity_mps,
             is_jaywalking: walker.is_jaywalking,
             is_crossing: walker.is_crossing(),
@@ -157,6 +173,7 @@ impl World {
         Snapshot {
             time_s,
             ego: self.ego,
+            ego_ground_m: self.ground_m(),
             vehicles: self.traffic.vehicles.iter().map(vehicle).collect(),
             walkers: self.walkers.walkers.iter().map(walker).collect(),
         }
@@ -166,11 +183,21 @@ impl World {
     pub fn snapshot(&self) -> Snapshot {
         let into = self.steps % SUBSTEPS;
         let share = if into == 0 && self.steps > 0 { 1.0 } else { into as f64 / SUBSTEPS as f64 };
-        Snapshot { time_s: self.time_s(), ego: self.ego, ..self.before.towards(&self.after, share) }
+        Snapshot {
+            time_s: self.time_s(),
+            ego: self.ego,
+            ego_ground_m: self.ground_m(),
+            ..self.before.towards(&self.after, share)
+        }
     }
 
     pub fn time_s(&self) -> f64 {
         self.steps as f64 * ego::STEP_S
+    }
+
+    /// Height of the ground below the ego vehicle, m.
+    pub fn ground_m(&self) -> f64 {
+        self.route.at(self.progress_m).height_m
     }
 
     pub fn ego(&self) -> &Car {
@@ -208,6 +235,7 @@ impl World {
             footprint,
             velocity_mps: self.ego.velocity_world_mps(),
         };
+        let is_level = |ground_m: f64| (ground_m - self.ground_m()).abs() < LEVEL_M;
         let into = (self.steps - 1) % SUBSTEPS + 1;
         let share = into as f64 / SUBSTEPS as f64;
         let near = |a: &DVec2, b: &DVec2| {
@@ -220,6 +248,7 @@ impl World {
         };
         let vehicles = self.before.vehicles.iter().zip(&self.after.vehicles);
         let vehicles = vehicles
+            .filter(|(_, b)| is_level(b.ground_m))
             .filter(|(a, b)| near(&a.footprint.centre_m, &b.footprint.centre_m))
             .map(|(a, b)| Body {
                 other: Other::Vehicle(b.kind),
@@ -229,6 +258,7 @@ impl World {
             });
         let walkers = self.before.walkers.iter().zip(&self.after.walkers);
         let walkers = walkers
+            .filter(|(_, b)| is_level(b.ground_m))
             .filter(|(a, b)| near(&a.footprint.centre_m, &b.footprint.centre_m))
             .map(|(a, b)| Body {
                 other: Other::Walker(b.kind),
@@ -254,10 +284,12 @@ impl World {
         for id in self.streets.lanes_near(self.ego.position_m, 6.0) {
             let lane = &self.streets.lanes[id];
             let (s_m, aside_m) = lane.course.project(self.ego.position_m);
-            let along = lane.course.at(s_m).forward;
+            let spot = lane.course.at(s_m);
+            let along = spot.forward;
             let inside = s_m > 0.0 && s_m < lane.length_m();
             let reaches_in = aside_m.abs() < lane.width_m / 2.0 + 0.5 * config.half_width_m;
-            if inside && reaches_in && along.dot(forward) > 0.3 {
+            let is_level = (spot.height_m - self.ground_m()).abs() < LEVEL_M;
+            if inside && is_level && reaches_in && along.dot(forward) > 0.3 {
                 let speed_mps = self.ego.speed_mps * along.dot(forward);
                 let half_length_m = config.half_length_m;
                 bodies.push((id, Occupant { actor: EGO, s_m, half_length_m, speed_mps }));
@@ -275,12 +307,13 @@ impl World {
 }
 
 /// The ego vehicle as three discs: what crosses its way sees where it is, whatever its lane.
-fn discs(ego: &Car) -> [Hazard; 3] {
+fn discs(ego: &Car, height_m: f64) -> [Hazard; 3] {
     let forward = DVec2::from_angle(ego.yaw_rad);
     let velocity_mps = ego.velocity_world_mps();
     [-1.5, 0.0, 1.5].map(|along_m| Hazard {
         position_m: ego.position_m + forward * along_m,
         velocity_mps,
         radius_m: ego.config.half_width_m,
+        height_m,
     })
 }
