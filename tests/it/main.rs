@@ -29,6 +29,8 @@ mod writers;
 mod clocks;
 mod accounts;
 mod shares;
+#[cfg(feature = "remote")]
+mod remote;
 mod rigs;
 mod conventions;
 mod real_drive;
