@@ -58,6 +58,7 @@ struct LogWork {
     /// When something was last heard of it, from the beginning of the ingest.
     heard: Duration,
     phase: Option<Phase>,
+    has_started: bool,
     has_ended: bool,
 }
 
@@ -85,6 +86,8 @@ pub struct Ledger {
     copying: Cost,
     reading: Cost,
     making: Cost,
+    at_once: usize,
+    most_at_once: usize,
     pub frames: u64,
     pub ended: usize,
 }
@@ -110,7 +113,12 @@ impl Ledger {
             cost.seconds += seconds;
         };
         match step {
-            Step::Started | Step::Hashed => log.phase = None,
+            Step::Started => {
+                self.at_once += 1;
+                self.most_at_once = self.most_at_once.max(self.at_once);
+                log.has_started = true;
+            }
+            Step::Hashed => log.phase = None,
             Step::Hashing => log.phase = Some(Phase::Hashing),
             Step::Copied { bytes } => {
                 spend(&mut self.copying, bytes as f64 - log.copied);
@@ -138,6 +146,7 @@ impl Ledger {
             }
             Step::Ended => {
                 (log.phase, log.has_ended) = (None, true);
+                self.at_once -= usize::from(log.has_started);
                 self.ended += 1;
             }
         }
@@ -175,7 +184,8 @@ impl Ledger {
         let seconds = self.copying.of(bytes(|log| log.to_copy - log.copied))?
             + self.reading.of(bytes(|log| log.bytes - log.read))?
             + self.making.of(bytes(|log| log.bytes - log.made))?;
-        let threads = left().filter(|log| log.phase.is_some()).count().max(1);
+        // Between two logs a thread is not idle for long.
+        let threads = self.most_at_once.min(left().count()).max(1);
         Duration::try_from_secs_f64(seconds / threads as f64).ok()
     }
 }
@@ -223,44 +233,45 @@ impl IngestProgress {
                 state.names = logs.iter().map(GivenLog::name).collect();
             }
             Event::OfLog { number, step } => {
+                let phase = |ledger: &Ledger| ledger.at_work(number).map(|(phase, _)| phase);
+                let before = phase(&state.ledger);
                 state.ledger.note(number, step, self.begun.elapsed());
                 let is_due = state.drawn.is_none_or(|drawn| drawn.elapsed() >= REDRAW_EVERY);
-                if is_due || state.ledger.at_work(number).is_none() {
-                    self.draw(state, number);
+                if is_due || phase(&state.ledger) != before {
+                    self.draw(state);
                 }
             }
             Event::Sending { bytes } => {
+                state.overall.reset();
                 state.overall.set_style(style(
                     "send {wide_bar} {binary_bytes} of {binary_total_bytes}, \
                      {binary_bytes_per_sec}, {eta} left",
                 ));
                 state.overall.set_length(bytes);
-                state.overall.reset();
             }
             Event::Sent { bytes } => state.overall.inc(bytes),
         }
     }
 
-    /// Draw the line of a log, and that of all.
-    fn draw(&self, state: &mut State, number: usize) {
+    fn draw(&self, state: &mut State) {
         state.drawn = Some(Instant::now());
-        match state.ledger.at_work(number) {
-            Some((phase, share)) => {
-                let name = state.names.get(number).cloned().unwrap_or_default();
-                let line = state.logs.entry(number).or_insert_with(|| {
-                    let bar = ProgressBar::new(BAR_STEPS);
-                    let template = "  {bar:20} {percent:>3} % {msg:13} {prefix}";
-                    self.lines.add(bar.with_style(style(template)).with_prefix(name))
-                });
-                line.set_message(phase.to_string());
-                line.set_position((share * BAR_STEPS as f64) as u64);
+        state.logs.retain(|number, line| {
+            let is_at_work = state.ledger.at_work(*number).is_some();
+            if !is_at_work {
+                line.finish_and_clear();
+                self.lines.remove(line);
             }
-            None => {
-                if let Some(line) = state.logs.remove(&number) {
-                    line.finish_and_clear();
-                    self.lines.remove(&line);
-                }
-            }
+            is_at_work
+        });
+        for (number, name) in state.names.iter().enumerate() {
+            let Some((phase, share)) = state.ledger.at_work(number) else { continue };
+            let line = state.logs.entry(number).or_insert_with(|| {
+                let bar = ProgressBar::new(BAR_STEPS);
+                let style = style("  {bar:20} {percent:>3} % {msg:13} {prefix}");
+                self.lines.add(bar.with_style(style).with_prefix(name.clone()))
+            });
+            line.set_message(phase.to_string());
+            line.set_position((share * BAR_STEPS as f64) as u64);
         }
         let ledger = &state.ledger;
         state.overall.set_position((ledger.share_done() * BAR_STEPS as f64) as u64);
@@ -282,5 +293,77 @@ impl IngestProgress {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.logs.values().for_each(ProgressBar::finish_and_clear);
         state.overall.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    /// A ledger of logs of so many bytes.
+    fn ledger(bytes: &[u64]) -> Ledger {
+        let log = |bytes: &u64| {
+            let mut log = GivenLog::local(PathBuf::from("none"));
+            log.bytes = *bytes;
+            log
+        };
+        Ledger::new(&bytes.iter().map(log).collect::<Vec<_>>())
+    }
+
+    fn note(ledger: &mut Ledger, at_s: u64, number: usize, step: Step) {
+        ledger.note(number, step, Duration::from_secs(at_s));
+    }
+
+    /// The whole of a log of so many bytes: 1 s to read 10 bytes, 3 s to make their frames.
+    fn go_through(ledger: &mut Ledger, begin_s: u64, number: usize, bytes: u64) {
+        note(ledger, begin_s, number, Step::Started);
+        note(ledger, begin_s + bytes / 10, number, Step::Read { bytes });
+        note(ledger, begin_s + bytes / 10, number, Step::Opened { ticks: 4 });
+        note(ledger, begin_s + bytes * 4 / 10, number, Step::Made { ticks: 4, frames: 3 });
+        note(ledger, begin_s + bytes * 4 / 10, number, Step::Ended);
+    }
+
+    #[test]
+    fn time_left_counts_logs_that_were_not_opened_by_their_size() {
+        let mut ledger = ledger(&[100, 50, 200]);
+        assert_eq!(ledger.time_left(), None);
+        go_through(&mut ledger, 0, 0, 100);
+        assert_eq!((ledger.ended, ledger.frames), (1, 3));
+        assert_eq!(ledger.time_left(), Some(Duration::from_secs(100)));
+        go_through(&mut ledger, 40, 1, 50);
+        assert_eq!(ledger.time_left(), Some(Duration::from_secs(80)));
+        // Half read: 10 s of reading are left, and 60 s of making.
+        note(&mut ledger, 60, 2, Step::Started);
+        note(&mut ledger, 70, 2, Step::Read { bytes: 100 });
+        assert_eq!(ledger.at_work(2), Some((Phase::Reading, 0.5)));
+        assert_eq!(ledger.time_left(), Some(Duration::from_secs(70)));
+        note(&mut ledger, 80, 2, Step::Read { bytes: 200 });
+        note(&mut ledger, 80, 2, Step::Opened { ticks: 8 });
+        note(&mut ledger, 95, 2, Step::Made { ticks: 2, frames: 2 });
+        assert_eq!(ledger.at_work(2), Some((Phase::MakingFrames, 0.25)));
+        assert_eq!(ledger.time_left(), Some(Duration::from_secs(45)));
+        assert!(ledger.share_done() > 0.7 && ledger.share_done() < 1.0);
+        note(&mut ledger, 140, 2, Step::Ended);
+        assert_eq!((ledger.time_left(), ledger.share_done()), (Some(Duration::ZERO), 1.0));
+    }
+
+    #[test]
+    fn threads_side_by_side_and_logs_that_were_committed_before_are_reckoned_with() {
+        let mut ledger = ledger(&[100, 100, 100, 100, 1000]);
+        // Found to be committed: it takes no time, and says nothing about the others.
+        note(&mut ledger, 0, 4, Step::Started);
+        note(&mut ledger, 0, 4, Step::Ended);
+        assert_eq!(ledger.time_left(), None);
+        note(&mut ledger, 0, 1, Step::Started);
+        go_through(&mut ledger, 0, 0, 100);
+        assert_eq!(ledger.time_left(), Some(Duration::from_secs(60)), "three logs on two threads");
+        // A log opened in two parts never goes back.
+        note(&mut ledger, 10, 1, Step::Read { bytes: 100 });
+        note(&mut ledger, 10, 1, Step::Opened { ticks: 4 });
+        note(&mut ledger, 25, 1, Step::Made { ticks: 3, frames: 3 });
+        note(&mut ledger, 25, 1, Step::Opened { ticks: 4 });
+        note(&mut ledger, 26, 1, Step::Made { ticks: 1, frames: 1 });
+        assert_eq!(ledger.at_work(1), Some((Phase::MakingFrames, 0.75)));
     }
 }

@@ -51,7 +51,7 @@ impl Claim {
             write_marker(out, config)?;
         }
         let found: IngestConfig = atomic::read_json(&path)?;
-        is_same(&found, config, out)?;
+        check_config(&found, config, out)?;
         // A finished dataset is only looked at, and may lie where nothing can be written.
         let is_finished = Manifest::path(out).exists();
         let open = OpenOptions::new().read(true).write(!is_finished).open(&path);
@@ -137,7 +137,7 @@ impl Held {
 /// # Errors
 ///
 /// [`Error::Dataset`] if `config` is another.
-pub fn is_same(found: &IngestConfig, config: &IngestConfig, place: &Path) -> Result<()> {
+pub fn check_config(found: &IngestConfig, config: &IngestConfig, place: &Path) -> Result<()> {
     if found == config {
         return Ok(());
     }

@@ -60,10 +60,11 @@ pub fn ingest(
     let mut plan = Plan::new(&logs, out, on)?;
     if Manifest::path(out).exists() {
         let finished = Manifest::read(out)?;
-        is_of(&finished, &plan, out)?;
+        check_logs(&finished, &plan, out)?;
         check_shards(&finished, out, &|shard| is_whole(out, shard))?;
         // A process that was killed after it had written the manifest may have left some.
         remove_leftovers(out, &finished.logs)?;
+        plan.tell_done(on);
         return Ok(finished);
     }
 
@@ -263,7 +264,7 @@ impl Source {
 /// # Errors
 ///
 /// [`Error::Dataset`] if one of them is not in it.
-pub fn is_of(finished: &Manifest, plan: &Plan, place: &Path) -> Result<()> {
+pub fn check_logs(finished: &Manifest, plan: &Plan, place: &Path) -> Result<()> {
     let has: Vec<&str> = finished.logs.iter().map(|log| log.source_sha256.as_str()).collect();
     let failed: Vec<&str> = finished.failed.iter().map(|log| log.source_log.as_str()).collect();
     let new = plan.jobs.iter().find(|job| {

@@ -125,6 +125,13 @@ impl Plan {
         Ok(plan)
     }
 
+    /// Tell that all work was done before.
+    pub fn tell_done(&self, on: &(dyn Fn(Event) + Sync)) {
+        for job in &self.jobs {
+            on(Event::OfLog { number: job.number, step: Step::Ended });
+        }
+    }
+
     /// Note that a log gave nothing.
     pub fn fail(&mut self, log: &GivenLog, error: Error) {
         // The manifest is the same on any machine, wherever its logs lie.

@@ -60,11 +60,12 @@ pub fn ingest_to(
         let finished: Manifest = target.read_json(manifest)?;
         on(Event::Begun { logs });
         let plan = Plan::hashing(logs, &|_| true, on)?;
-        ingest::is_of(&finished, &plan, &target.place())?;
+        ingest::check_logs(&finished, &plan, &target.place())?;
         ingest::check_shards(&finished, &target.place(), &|shard| {
             found.iter().any(|file| file.name == shard.path && file.object.bytes == shard.bytes)
         })?;
         remove(&staging)?;
+        plan.tell_done(on);
         return Ok(finished);
     }
     let manifest = ingest(logs, &staging, config, None, on)
@@ -142,7 +143,7 @@ impl Target {
             return Ok(());
         }
         match found.iter().find(|file| file.name == MARKER) {
-            Some(marker) => claim::is_same(&self.read_json(marker)?, config, &self.place()),
+            Some(marker) => claim::check_config(&self.read_json(marker)?, config, &self.place()),
             None => self.refuse("a prefix that is not empty and no dataset"),
         }
     }

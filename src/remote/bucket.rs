@@ -238,10 +238,13 @@ fn parse(url: &ObjectUrl) -> Result<Key> {
 
 /// What a store says, in a sentence, and what to do about it.
 fn refused(action: &'static str, url: &ObjectUrl, error: &StoreError) -> Error {
-    let settings = match url.scheme.as_str() {
-        "gs" => "GOOGLE_APPLICATION_CREDENTIALS",
-        "s3" | "s3a" => "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL",
-        _ => "AZURE_STORAGE_ACCOUNT_NAME, AZURE_STORAGE_ACCOUNT_KEY",
+    let (settings, plain_http) = match url.scheme.as_str() {
+        "gs" => ("GOOGLE_APPLICATION_CREDENTIALS", "GOOGLE_ALLOW_HTTP"),
+        "s3" | "s3a" => (
+            "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL",
+            "AWS_ALLOW_HTTP",
+        ),
+        _ => ("AZURE_STORAGE_ACCOUNT_NAME, AZURE_STORAGE_ACCOUNT_KEY", "AZURE_ALLOW_HTTP"),
     };
     let cause = innermost_cause(error);
     // A listing that is refused has no kind of its own.
@@ -266,7 +269,7 @@ fn refused(action: &'static str, url: &ObjectUrl, error: &StoreError) -> Error {
         }
         _ => format!(
             "are the network and the settings in the environment right ({settings}; \
-             AWS_ALLOW_HTTP=true for http://)? Given again, the same command goes on"
+             {plain_http}=true for http://)? Given again, the same command goes on"
         ),
     };
     Error::Remote { action, url: url.to_string(), why: said_by_store(&cause), hint }

@@ -29,6 +29,7 @@ mod writers;
 mod clocks;
 mod accounts;
 mod shares;
+mod progress;
 #[cfg(feature = "remote")]
 mod remote;
 mod rigs;

@@ -294,7 +294,7 @@ fn a_file_of_several_pieces_arrives_whole() {
     let mut messages = drive.messages();
     for (i, message) in messages.iter_mut().enumerate() {
         if message.type_name == "sensor_msgs/CompressedImage" {
-            let noise = (0..60 * 25 * 3).map(|at| (at * 2_654_435_761_u64 >> (i % 16)) as u8);
+            let noise = (0..60 * 25 * 3).map(|at| ((at * 2_654_435_761_u64) >> (i % 16)) as u8);
             let mut jpeg = Vec::new();
             let encoder = jpeg_encoder::Encoder::new(&mut jpeg, 90);
             let rgb: Vec<u8> = noise.collect();
