@@ -295,3 +295,36 @@ fn said_by_store(text: &str) -> String {
         _ => text.trim().trim_end_matches(':').to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_store_is_opened_by_its_scheme_and_others_are_refused() {
+        let open = |text| Bucket::open(&ObjectUrl::parse(text).unwrap());
+        for (url, store) in [
+            ("s3://bucket/a/b", "AmazonS3(bucket)"),
+            ("gs://bucket/a/b", "GoogleCloudStorage(bucket)"),
+            (
+                "abfss://data@account.dfs.core.windows.net/a/b",
+                "MicrosoftAzure { account: account, container: data }",
+            ),
+        ] {
+            let bucket = open(url).map_err(|error| error.to_string()).unwrap();
+            assert_eq!(bucket.store.to_string(), store);
+            assert_eq!(bucket.root.with_key("a/b").to_string(), url);
+        }
+        let error = open("ftp://host/a").err().unwrap();
+        assert!(error.to_string().contains("no object store"), "{error}");
+    }
+
+    #[test]
+    fn of_an_answer_in_xml_its_elements_are_told() {
+        let xml = "Server returned non-2xx status code: 404 Not Found: <?xml?><Error><Code>NoSuchBucket\
+                   </Code><Message> It is not there </Message></Error>";
+        assert_eq!(said_by_store(xml), "NoSuchBucket: It is not there");
+        assert_eq!(said_by_store("<Code>Busy</Code>"), "Busy");
+        assert_eq!(said_by_store("status 403: "), "status 403");
+    }
+}
