@@ -4,7 +4,10 @@
 //! [`crate::cli`] can print it on its own line. Bad *data* inside a good file is not an error:
 //! it is counted in [`crate::drops`].
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 /// Result of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -20,6 +23,10 @@ pub enum Error {
     /// An output that is there already; nothing is overwritten without being asked.
     #[error("will not overwrite {}", path.display())]
     Exists { path: PathBuf, hint: String },
+
+    /// An object store refused, or could not be reached.
+    #[error("cannot {action} {url}: {why}")]
+    Remote { action: &'static str, url: String, why: String, hint: String },
 
     /// A log file that cannot be used at all.
     #[error("{what} (byte {offset}) in {}", path.display())]
@@ -124,6 +131,18 @@ impl Error {
         move |source| Error::Json { path, source }
     }
 
+    /// The same, of a file that a person knows by another name than that of the copy which was read.
+    pub fn of_original(self, copy: &Path, original: &Path) -> Error {
+        let named = |path: PathBuf| if path == copy { original.to_path_buf() } else { path };
+        match self {
+            Error::Log { path, offset, what, hint } => {
+                Error::Log { path: named(path), offset, what, hint }
+            }
+            Error::Mapping { path, what, hint } => Error::Mapping { path: named(path), what, hint },
+            other => other,
+        }
+    }
+
     /// What the person at the keyboard can do about it, where there is something to do.
     pub fn hint(&self) -> Option<String> {
         match self {
@@ -134,7 +153,13 @@ impl Error {
             | Error::Policy { hint, .. }
             | Error::Report { hint, .. }
             | Error::Config { hint, .. } => hint.clone(),
-            Error::Mapping { hint, .. } | Error::Exists { hint, .. } => Some(hint.clone()),
+            Error::Mapping { hint, .. }
+            | Error::Exists { hint, .. }
+            | Error::Remote { hint, .. } => Some(hint.clone()),
+            Error::Io { source, .. } if source.kind() == ErrorKind::StorageFull => Some(
+                "free some space, or choose a folder on another disk; the same command then goes on"
+                    .into(),
+            ),
             Error::Definition { schema, .. } => Some(format!(
                 "the log carries a definition of {schema} that pmp cannot read; \
                  `pmp-ingest inspect LOG` shows which topics use it"

@@ -14,6 +14,7 @@
 
 pub mod error;
 pub mod atomic;
+pub mod remote;
 pub mod projection;
 pub mod drops;
 pub mod frame;
@@ -31,3 +32,4 @@ pub mod stats;
 #[cfg(feature = "learning")]
 pub mod eval;
 pub mod cli;
+pub mod ingest_progress;

@@ -6,16 +6,23 @@ use clap::{Args, Parser, Subcommand};
 use pmp::{
     cli::{self, Outcome},
     dataset::{
-        ingest::{self, Event, Share},
-        inspect, manifest,
+        ingest::ingest,
+        ingest_event::Event,
+        inspect,
+        logs::{GivenLog, find_logs},
+        manifest,
+        plan::Share,
+        publish::ingest_to,
     },
-    error::Result,
+    error::{Error, Result},
     frame::GRID_HZ,
+    ingest_progress::IngestProgress,
     log::{
         clock::{self, Clock},
         profile::Profile,
         rigs::Rig,
     },
+    remote::{location::Location, spool},
 };
 
 /// Turn MCAP driving logs into a sharded Parquet dataset
@@ -41,12 +48,14 @@ struct Cli {
 enum Inspect {
     /// Show topics, types and rates of a log, and the mapping that ingest would use
     Inspect {
-        /// MCAP file
-        log: PathBuf,
+        /// MCAP file, or its URL
+        log: Location,
         #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
         profile: String,
         #[command(flatten)]
         reading: Reading,
+        #[command(flatten)]
+        spooling: Spooling,
         /// Print JSON
         #[arg(long)]
         json: bool,
@@ -70,23 +79,43 @@ struct Reading {
     offset: Vec<(String, f64)>,
 }
 
+/// Where what comes from object stores, or goes there, lies for a while.
+#[derive(Args)]
+#[group(skip)]
+struct Spooling {
+    /// Folder for copies of remote logs, one a thread at a time, and for a dataset that goes to a
+    /// URL; it needs the room, and is what a killed run goes on from [default: pmp-spool in the
+    /// system's temporary folder]
+    #[arg(long, value_name = "DIR")]
+    spool: Option<PathBuf>,
+}
+
+impl Spooling {
+    fn folder(&self) -> PathBuf {
+        self.spool.clone().unwrap_or_else(spool::default_folder)
+    }
+}
+
 // Named, since clap does not count the arguments of a struct that has flattened ones in it.
 #[derive(Args)]
 #[group(args = ["logs", "out"])]
 struct Ingest {
-    /// MCAP files, or folders searched for `*.mcap`
+    /// MCAP files, or folders searched for `*.mcap`; either may be a URL (s3://, gs://, az://)
     #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
+    logs: Vec<Location>,
 
-    /// Folder to make the dataset in
+    /// Folder to make the dataset in, or the URL to send it to when it is whole
     #[arg(short, long, value_name = "DATASET")]
-    out: PathBuf,
+    out: Location,
 
     #[arg(long, default_value = "auto", value_name = "NAME|FILE.toml", help = profile_help())]
     profile: String,
 
     #[command(flatten)]
     reading: Reading,
+
+    #[command(flatten)]
+    spooling: Spooling,
 
     /// Ticks a second
     #[arg(long, default_value_t = GRID_HZ, value_name = "HZ")]
@@ -131,35 +160,60 @@ Examples:
   pmp-ingest --out data a.mcap b.mcap --profile my-car.toml
   pmp-ingest --out data drives/ --shard 2/8  the second of eight processes that share the work
   pmp-ingest --out data a.mcap --topic camera=/front_left/image
+  pmp-ingest --out s3://bucket/data s3://bucket/drives gs://other/a.mcap
+                                             logs from object stores, and the dataset into one
   pmp-ingest inspect a.mcap                  what is in a log, and what would be used
+
+Object stores take credentials and endpoints from the environment: AWS_ACCESS_KEY_ID,
+AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ENDPOINT_URL (with AWS_ALLOW_HTTP=true for http://);
+GOOGLE_APPLICATION_CREDENTIALS; AZURE_STORAGE_ACCOUNT_NAME, AZURE_STORAGE_ACCOUNT_KEY.
 
 Exit codes: 0 everything was used; 3 something was left out, the report says what; 1 failed; 2 misused";
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     cli::main(|| match (cli.command, cli.ingest) {
-        (Some(Inspect::Inspect { log, profile: name, reading, json }), _) => {
-            let report = inspect::inspect(&log, &profile(&name, &reading)?)?;
+        (Some(Inspect::Inspect { log, profile: name, reading, spooling, json }), _) => {
+            let local = one_log(log, &spooling)?.fetch(&|_| ())?;
+            let report = inspect::inspect(local.path(), &profile(&name, &reading)?);
+            let report = report.map_err(|error| local.own(error))?;
             cli::print(&if json { report.json() } else { report.to_string() })?;
-            report.open_question.map_or(Ok(Outcome::Done), Err)
+            report.open_question.map_or(Ok(Outcome::Done), |error| Err(local.own(error)))
         }
         (None, Some(args)) => run(&args),
         (None, None) => unreachable!("clap asks for LOG"),
     })
 }
 
+/// The log to look at.
+fn one_log(place: Location, spooling: &Spooling) -> Result<GivenLog> {
+    if let Location::Local(path) = place {
+        return Ok(GivenLog::local(path));
+    }
+    let mut logs = find_logs(&[place], &spooling.folder())?;
+    match logs.len() {
+        1 => Ok(logs.remove(0)),
+        count => Err(Error::Config {
+            key: "LOG".into(),
+            what: format!("there are {count} logs below this URL, the first is {}", logs[0].name()),
+            hint: Some("give the URL of one".into()),
+        }),
+    }
+}
+
 fn run(args: &Ingest) -> Result<Outcome> {
-    let logs = ingest::find_logs(&args.logs)?;
     let profile = profile(&args.profile, &args.reading)?;
     let config = manifest::IngestConfig::new(profile, args.rate)?;
-    let bar = cli::progress(0, "frames", "ingest");
-    let on = |event| match event {
-        Event::Opened { ticks } => bar.inc_length(ticks),
-        Event::Made { ticks } => bar.inc(ticks),
-    };
-    let manifest = cli::thread_pool(args.jobs)?
-        .install(|| ingest::ingest(&logs, &args.out, &config, args.shard, &on))?;
-    bar.finish_and_clear();
+    let spool = args.spooling.folder();
+    let logs = find_logs(&args.logs, &spool)?;
+    let progress = IngestProgress::default();
+    let on = |event: Event| progress.tell(event);
+    let manifest = cli::thread_pool(args.jobs)?.install(|| match &args.out {
+        Location::Local(out) => ingest(&logs, out, &config, args.shard, &on),
+        Location::Remote(url) => ingest_to(url, &logs, &spool, &config, args.shard, &on),
+    });
+    progress.finish();
+    let manifest = manifest?;
     eprint!("{}", manifest.report());
     let loss = !manifest.failed.is_empty() || manifest.logs.iter().any(|log| log.has_loss());
     Ok(if loss { Outcome::DoneWithLoss } else { Outcome::Done })

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Name of the configuration, which is written first.
-const MARKER: &str = "ingest.json";
+pub const MARKER: &str = "ingest.json";
 
 /// The right to write into a dataset's folder.
 #[derive(Debug)]
@@ -51,12 +51,7 @@ impl Claim {
             write_marker(out, config)?;
         }
         let found: IngestConfig = atomic::read_json(&path)?;
-        if found != *config {
-            return refuse(
-                "a dataset made with another configuration",
-                "choose another --out: a dataset is never changed",
-            );
-        }
+        check_config(&found, config, out)?;
         // A finished dataset is only looked at, and may lie where nothing can be written.
         let is_finished = Manifest::path(out).exists();
         let open = OpenOptions::new().read(true).write(!is_finished).open(&path);
@@ -135,6 +130,20 @@ impl Held {
             _ => file.unlock().map_err(Error::io("unlock", &path)),
         }
     }
+}
+
+/// That the dataset at `place`, made with the configuration `found`, may be gone on with.
+///
+/// # Errors
+///
+/// [`Error::Dataset`] if `config` is another.
+pub fn check_config(found: &IngestConfig, config: &IngestConfig, place: &Path) -> Result<()> {
+    if found == config {
+        return Ok(());
+    }
+    let what = "a dataset made with another configuration".to_string();
+    let hint = Some("choose another --out: a dataset is never changed".to_string());
+    Err(Error::Dataset { path: place.to_path_buf(), what, hint })
 }
 
 /// Whether a folder is not there or holds nothing but markers that others are about to place.

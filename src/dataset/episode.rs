@@ -35,7 +35,7 @@ pub struct Episode {
 
 impl Episode {
     /// Write the shards of a drive into a dataset, `blocks_at_once` row groups in memory; `on`
-    /// hears of the ticks that were made.
+    /// hears of the ticks that were made, and of the frames that came of them.
     ///
     /// # Errors
     ///
@@ -46,7 +46,7 @@ impl Episode {
         split: Split,
         out: &Path,
         blocks_at_once: usize,
-        on: &dyn Fn(u64),
+        on: &dyn Fn(u64, u64),
     ) -> Result<Episode> {
         let mut made = MadeFrames {
             drops: drive.grid.drops.clone(),
@@ -73,7 +73,7 @@ impl Episode {
                             Err((reason, at_ns, why)) => made.drops.add(reason, at_ns, Some(why)),
                         }
                     }
-                    on(block.len() as u64);
+                    on(block.len() as u64, frames.len() as u64);
                     if !frames.is_empty() {
                         made.note_frames(&frames);
                         writer.write(id, &frames)?;

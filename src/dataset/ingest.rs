@@ -11,7 +11,7 @@
 //! others anew; every file's bytes are a function of the log and the configuration alone.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    cell::Cell,
     fs,
     path::{Path, PathBuf},
 };
@@ -27,61 +27,16 @@ use crate::{
         drive::Drive,
         episode::Episode,
         episodes::write_episodes,
-        manifest::{FailedLog, IngestConfig, LogRecord, Manifest},
+        ingest_event::{Event, Step},
+        logs::{GivenLog, LocalLog},
+        manifest::{IngestConfig, LogRecord, Manifest},
+        plan::{Job, Plan, Share},
         record::{Parts, Source},
         shard::ShardRecord,
     },
     error::{Error, Result},
     log::recording::Recording,
 };
-
-/// What an ingest tells while it runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// A log was scanned and has so many ticks to make.
-    Opened { ticks: u64 },
-    /// So many ticks were made.
-    Made { ticks: u64 },
-}
-
-/// Files among the arguments: a folder stands for all `.mcap` files in it and below it.
-///
-/// # Errors
-///
-/// [`Error::Io`] if a path does not exist, [`Error::Config`] if there is no log at all.
-pub fn find_logs(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let mut logs = Vec::new();
-    for path in paths {
-        let metadata = fs::metadata(path).map_err(Error::io("find", path))?;
-        if metadata.is_dir() {
-            collect(path, &mut logs)?;
-        } else {
-            logs.push(path.clone());
-        }
-    }
-    logs.sort();
-    logs.dedup();
-    if logs.is_empty() {
-        return Err(Error::Config {
-            key: "LOG".into(),
-            what: "no .mcap file in the folders given".into(),
-            hint: Some("give MCAP files, or folders that hold some".into()),
-        });
-    }
-    Ok(logs)
-}
-
-fn collect(folder: &Path, logs: &mut Vec<PathBuf>) -> Result<()> {
-    for entry in fs::read_dir(folder).map_err(Error::io("read", folder))? {
-        let path = entry.map_err(Error::io("read", folder))?.path();
-        if path.is_dir() {
-            collect(&path, logs)?;
-        } else if path.extension().is_some_and(|extension| extension == "mcap") {
-            logs.push(path);
-        }
-    }
-    Ok(())
-}
 
 /// Ingest logs into a dataset, on as many threads as the current rayon pool has.
 ///
@@ -93,152 +48,70 @@ fn collect(folder: &Path, logs: &mut Vec<PathBuf>) -> Result<()> {
 /// If the output folder is something else or another dataset, if another process is at work there,
 /// if the disk refuses, or if every log fails (then with the first one's error).
 pub fn ingest(
-    logs: &[PathBuf],
+    logs: &[GivenLog],
     out: &Path,
     config: &IngestConfig,
     share: Option<Share>,
     on: &(dyn Fn(Event) + Sync),
 ) -> Result<Manifest> {
     let claim = Claim::new(out, config, share.is_some())?;
-    let logs: Vec<PathBuf> = match share {
-        Some(share) => share.of(logs),
-        None => logs.to_vec(),
-    };
-    let hashes: Vec<Result<Option<String>>> = match share.is_some() || Manifest::path(out).exists()
-    {
-        true => logs.par_iter().map(|log| sha256_of_file(log).map(Some)).collect(),
-        false => {
-            let ambiguous = sizes_that_may_be_known(&logs, out)?;
-            let hash = |log: &PathBuf| {
-                let bytes = fs::metadata(log).map_err(Error::io("find", log))?.len();
-                let is_needed = ambiguous.contains(&bytes);
-                is_needed.then(|| sha256_of_file(log)).transpose()
-            };
-            logs.par_iter().map(hash).collect()
-        }
-    };
-    let mut jobs: Vec<Job> = Vec::new();
-    let mut failed = Vec::new();
-    let mut first_error = None;
-    let mut fail = |log: &Path, error: Error| {
-        // The manifest is the same on any machine, wherever its logs lie.
-        let text = error.to_string().replace(&*log.to_string_lossy(), &file_name(log));
-        failed.push(FailedLog { source_log: file_name(log), error: text });
-        first_error.get_or_insert(error);
-    };
-    let mut seen: BTreeMap<String, &PathBuf> = BTreeMap::new();
-    for (log, hash) in logs.iter().zip(hashes) {
-        match hash {
-            Err(error) => fail(log, error),
-            Ok(None) => jobs.push(Job { path: log.clone(), source: None }),
-            Ok(Some(sha256)) => match seen.get(&sha256) {
-                Some(other) => {
-                    let what = format!("the same bytes as {}", file_name(other));
-                    let (path, hint) = (log.clone(), Some("name each log once".to_string()));
-                    fail(log, Error::Log { path, offset: 0, what, hint });
-                }
-                None => {
-                    seen.insert(sha256.clone(), log);
-                    let source = Some(Source::new(log.clone(), sha256));
-                    jobs.push(Job { path: log.clone(), source });
-                }
-            },
-        }
-    }
+    let logs = share.map_or_else(|| logs.to_vec(), |share| share.of(logs));
+    on(Event::Begun { logs: &logs });
+    let mut plan = Plan::new(&logs, out, on)?;
     if Manifest::path(out).exists() {
-        return same_logs(Manifest::read(out)?, &jobs, out);
+        let finished = Manifest::read(out)?;
+        check_logs(&finished, &plan, out)?;
+        check_shards(&finished, out, &|shard| is_whole(out, shard))?;
+        // A process that was killed after it had written the manifest may have left some.
+        remove_leftovers(out, &finished.logs)?;
+        plan.tell_done(on);
+        return Ok(finished);
     }
 
     // Either the logs keep all threads busy or the blocks of one log do, never both: a thread
     // that waits for its blocks would start another log and hold both in memory.
-    let by_log = jobs.len() >= rayon::current_num_threads();
+    let by_log = plan.jobs.len() >= rayon::current_num_threads();
+    let blocks = if by_log { 1 } else { 2 * rayon::current_num_threads() };
+    let commit = |job: &Job| {
+        let record = job.commit(&claim, config, blocks, &|step| {
+            on(Event::OfLog { number: job.number, step });
+        });
+        match record {
+            // The disk and the network are the same for all logs: what they refuse once is no
+            // matter of one log.
+            Err(error @ Error::Io { .. }) if job.log.is_there() => Err(error),
+            Err(error @ Error::Remote { .. }) => Err(error),
+            record => Ok(record),
+        }
+    };
+    let jobs = std::mem::take(&mut plan.jobs);
     let records: Vec<Result<LogRecord>> = if by_log {
-        jobs.par_iter().map(|job| job.commit(&claim, config, 1, on)).collect()
+        jobs.par_iter().map(commit).collect::<Result<_>>()?
     } else {
-        let blocks = 2 * rayon::current_num_threads();
-        jobs.iter().map(|job| job.commit(&claim, config, blocks, on)).collect()
+        jobs.iter().map(commit).collect::<Result<_>>()?
     };
     let mut committed = Vec::new();
     for (job, record) in jobs.iter().zip(records) {
         match record {
             Ok(record) => committed.push(record),
-            // The disk is the same for all logs: what it refuses once is no matter of one log.
-            Err(error @ Error::Io { .. }) if fs::metadata(&job.path).is_ok() => return Err(error),
-            Err(error) => fail(&job.path, error),
+            Err(error) => plan.fail(&job.log, error),
         }
     }
-    let has_nothing_to_do = jobs.is_empty() && failed.is_empty() && share.is_some();
+    let has_nothing_to_do = jobs.is_empty() && plan.failed.is_empty() && share.is_some();
     if committed.is_empty() && !has_nothing_to_do {
         claim.abandon()?;
         let nothing = || Error::Config { key: "LOG".into(), what: "no log".into(), hint: None };
-        return Err(first_error.unwrap_or_else(nothing));
+        return Err(plan.first_error.unwrap_or_else(nothing));
     }
     if share.is_some() {
-        return Ok(Manifest::new(config.clone(), committed, failed));
+        return Ok(Manifest::new(config.clone(), committed, plan.failed));
     }
     compact(out, &mut committed)?;
-    let manifest = Manifest::new(config.clone(), committed, failed);
+    let manifest = Manifest::new(config.clone(), committed, plan.failed);
     write_episodes(&out.join("episodes.parquet"), &manifest.logs)?;
     atomic::write_json(&Manifest::path(out), &manifest)?;
     remove_leftovers(out, &manifest.logs)?;
     Ok(manifest)
-}
-
-/// One of several parts of the work, for a process of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Share {
-    /// From 1.
-    pub number: usize,
-    pub of: usize,
-}
-
-impl Share {
-    /// `i/n`, as the flag `--shard` has it.
-    ///
-    /// # Errors
-    ///
-    /// A sentence that says what is wrong.
-    pub fn parse(text: &str) -> Result<Share, String> {
-        let numbers = text.split_once('/');
-        let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-        match numbers {
-            Some((number, of)) if (1..=of).contains(&number) => Ok(Share { number, of }),
-            _ => Err("it is i/n with 1 <= i <= n, as in 2/8".to_string()),
-        }
-    }
-
-    /// Its logs, by their place in the list of all: every process is given the same list.
-    fn of(self, logs: &[PathBuf]) -> Vec<PathBuf> {
-        logs.iter().skip(self.number - 1).step_by(self.of).cloned().collect()
-    }
-}
-
-/// Sizes of logs whose bytes have to be told apart before they are read: of those that are
-/// committed, and of those that are given twice. All others are hashed while they are read.
-fn sizes_that_may_be_known(logs: &[PathBuf], out: &Path) -> Result<BTreeSet<u64>> {
-    let (mut seen, mut twice) = (BTreeSet::new(), BTreeSet::new());
-    for log in logs {
-        let bytes = fs::metadata(log).map_or(0, |metadata| metadata.len());
-        if !seen.insert(bytes) {
-            twice.insert(bytes);
-        }
-    }
-    let records = out.join("logs");
-    let Ok(entries) = fs::read_dir(&records) else { return Ok(twice) };
-    for entry in entries {
-        let path = entry.map_err(Error::io("read", &records))?.path();
-        if path.extension().is_some_and(|extension| extension == "json") {
-            let record: LogRecord = atomic::read_json(&path)?;
-            twice.insert(record.source_bytes);
-        }
-    }
-    Ok(twice)
-}
-
-/// A log to commit; its bytes may be known only when it has been read.
-struct Job {
-    path: PathBuf,
-    source: Option<Source>,
 }
 
 impl Job {
@@ -248,28 +121,69 @@ impl Job {
         claim: &Claim,
         config: &IngestConfig,
         blocks_at_once: usize,
-        on: &(dyn Fn(Event) + Sync),
+        on: &(dyn Fn(Step) + Sync),
     ) -> Result<LogRecord> {
-        let scan = || Recording::scan(&self.path, &config.profile.clock);
-        match &self.source {
-            Some(source) => {
-                let held = claim.hold(&source.episode)?;
-                let record = match source.committed(claim)? {
-                    Some(record) => Ok(record),
-                    None => scan().and_then(|recordings| {
-                        source.ingest(recordings, claim, config, blocks_at_once, on)
-                    }),
-                };
-                held.release()?;
-                record
-            }
-            None => {
-                let recordings = scan()?;
-                let source = Source::new(self.path.clone(), recordings[0].log.sha256.clone());
-                source.ingest(recordings, claim, config, blocks_at_once, on)
-            }
-        }
+        on(Step::Started);
+        let record = self.commit_telling(claim, config, blocks_at_once, on);
+        on(Step::Ended);
+        record
     }
+
+    fn commit_telling(
+        &self,
+        claim: &Claim,
+        config: &IngestConfig,
+        blocks_at_once: usize,
+        on: &(dyn Fn(Step) + Sync),
+    ) -> Result<LogRecord> {
+        let mut local = None;
+        let mut sha256 = self.sha256.clone();
+        // Another share may be given the same bytes under another name.
+        if claim.is_share && sha256.is_none() {
+            let fetched = self.fetch(on)?;
+            on(Step::Hashing);
+            sha256 = Some(sha256_of_file(fetched.path())?);
+            on(Step::Hashed);
+            local = Some(fetched);
+        }
+        let known = sha256.map(|sha256| Source::new(self.log.path.clone(), sha256));
+        let held = known.as_ref().map(|source| claim.hold(&source.episode)).transpose()?;
+        let committed = known.as_ref().map(|source| source.committed(claim)).transpose()?;
+        let record = match committed.flatten() {
+            Some(record) => Ok(record),
+            None => local.map_or_else(|| self.fetch(on), Ok).and_then(|local| {
+                ingest_file(&local, claim, config, blocks_at_once, on)
+                    .map_err(|error| local.own(error))
+            }),
+        };
+        held.map_or(Ok(()), |held| held.release())?;
+        if let Ok(record) = &record {
+            self.log.remember(&record.source_sha256)?;
+        }
+        record
+    }
+
+    fn fetch(&self, on: &(dyn Fn(Step) + Sync)) -> Result<LocalLog> {
+        let copied = Cell::new(0);
+        self.log.fetch(&|bytes| {
+            copied.set(copied.get() + bytes);
+            on(Step::Copied { bytes: copied.get() });
+        })
+    }
+}
+
+/// Make the frames of a file, and its record.
+fn ingest_file(
+    local: &LocalLog,
+    claim: &Claim,
+    config: &IngestConfig,
+    blocks_at_once: usize,
+    on: &(dyn Fn(Step) + Sync),
+) -> Result<LogRecord> {
+    let on_bytes = |bytes| on(Step::Read { bytes });
+    let recordings = Recording::scan_telling(local.path(), &config.profile.clock, &on_bytes)?;
+    let source = Source::new(local.path().to_path_buf(), recordings[0].log.sha256.clone());
+    source.ingest(recordings, claim, config, blocks_at_once, on)
 }
 
 impl Source {
@@ -300,7 +214,7 @@ impl Source {
         claim: &Claim,
         config: &IngestConfig,
         blocks_at_once: usize,
-        on: &(dyn Fn(Event) + Sync),
+        on: &(dyn Fn(Step) + Sync),
     ) -> Result<LogRecord> {
         let out = &claim.out;
         // What an attempt that was killed has left.
@@ -312,8 +226,8 @@ impl Source {
             let id = parts.next_id(self);
             let write = || {
                 let drive = Drive::new(recording, &config.profile, config.rate_hz)?;
-                on(Event::Opened { ticks: drive.grid.ticks.len() as u64 });
-                let on = |ticks| on(Event::Made { ticks });
+                on(Step::Opened { ticks: drive.grid.ticks.len() as u64 });
+                let on = |ticks, frames| on(Step::Made { ticks, frames });
                 Episode::write(&drive, &id, self.split, out, blocks_at_once, &on)
             };
             match write() {
@@ -345,30 +259,39 @@ impl Source {
     }
 }
 
-/// A finished dataset is answered with itself, if it was made from these logs.
-fn same_logs(finished: Manifest, jobs: &[Job], out: &Path) -> Result<Manifest> {
-    let has: Vec<&str> = finished.logs.iter().map(|log| log.episode.as_str()).collect();
+/// That a finished dataset, which lies at `place`, was made from these logs.
+///
+/// # Errors
+///
+/// [`Error::Dataset`] if one of them is not in it.
+pub fn check_logs(finished: &Manifest, plan: &Plan, place: &Path) -> Result<()> {
+    let has: Vec<&str> = finished.logs.iter().map(|log| log.source_sha256.as_str()).collect();
     let failed: Vec<&str> = finished.failed.iter().map(|log| log.source_log.as_str()).collect();
-    let new = jobs.iter().find(|job| {
-        let episode = job.source.as_ref().map(|source| source.episode.as_str());
-        let is_in = episode.is_some_and(|episode| has.contains(&episode));
-        !is_in && !failed.contains(&file_name(&job.path).as_str())
+    let new = plan.jobs.iter().find(|job| {
+        let is_in = job.sha256.as_ref().is_some_and(|sha256| has.contains(&sha256.as_str()));
+        !is_in && !failed.contains(&job.log.name().as_str())
     });
-    if let Some(job) = new {
-        let what = format!("a finished dataset, without {}", job.path.display());
-        let hint = Some("choose another --out: a dataset is never changed".to_string());
-        return Err(Error::Dataset { path: out.to_path_buf(), what, hint });
-    }
-    if let Some(shard) =
-        finished.logs.iter().flat_map(|log| &log.shards).find(|shard| !is_whole(out, shard))
-    {
-        let what = format!("a dataset whose shard {} is missing or damaged", shard.path);
-        let hint = Some("remove the dataset and ingest the logs again".to_string());
-        return Err(Error::Dataset { path: out.to_path_buf(), what, hint });
-    }
-    // A process that was killed after it had written the manifest may have left some.
-    remove_leftovers(out, &finished.logs)?;
-    Ok(finished)
+    let Some(job) = new else { return Ok(()) };
+    let what = format!("a finished dataset, without {}", job.log.path.display());
+    let hint = Some("choose another --out: a dataset is never changed".to_string());
+    Err(Error::Dataset { path: place.to_path_buf(), what, hint })
+}
+
+/// That a finished dataset, which lies at `place`, has all its shards.
+///
+/// # Errors
+///
+/// [`Error::Dataset`] if one of them is not whole.
+pub fn check_shards(
+    finished: &Manifest,
+    place: &Path,
+    is_whole: &dyn Fn(&ShardRecord) -> bool,
+) -> Result<()> {
+    let mut shards = finished.logs.iter().flat_map(|log| &log.shards);
+    let Some(shard) = shards.find(|shard| !is_whole(shard)) else { return Ok(()) };
+    let what = format!("a dataset whose shard {} is missing or damaged", shard.path);
+    let hint = Some("remove the dataset and ingest the logs again".to_string());
+    Err(Error::Dataset { path: place.to_path_buf(), what, hint })
 }
 
 fn is_whole(out: &Path, shard: &ShardRecord) -> bool {

@@ -5,7 +5,8 @@
 //!            odometry, /tf, dead_reckoning, gnss (geodesy, heading); world, base_frame
 //!         -> align (grid) -> senses (picture, ralidar) -> drive (frames) -> columns -> shard
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
-//! ingest: one log after the other, each committed alone; split, manifest, episodes, summary, inspect
+//! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
+//! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, summary, inspect
 //! open (which frames train, which judge) -> order -> sample -> batch, by loader
 //! ```
 
@@ -42,7 +43,11 @@ pub mod episode;
 pub mod record;
 pub mod claim;
 pub mod compaction;
+pub mod logs;
+pub mod ingest_event;
+pub mod plan;
 pub mod ingest;
+pub mod publish;
 pub mod inspect;
 pub mod open;
 pub mod order;

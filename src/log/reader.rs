@@ -41,6 +41,9 @@ const FOREIGN: [(&[u8], &str, &str); 5] = [
     (b"\x28\xb5\x2f\xfd", "a zstd file", "unpack it with `unzstd`"),
 ];
 
+/// How far a scan has come is told no more often than this.
+const TELL_EVERY_BYTES: u64 = 1 << 20;
+
 const MESSAGE_HEADER_BYTES: usize = 22;
 
 /// The definition of a message type, as the log carries it.
@@ -127,6 +130,19 @@ impl Log {
     /// If the file cannot be opened or read, is empty, or does not begin as an MCAP file does;
     /// and whatever `on_message` returns.
     pub fn scan(path: &Path, on_message: &mut dyn FnMut(&Message) -> Result<()>) -> Result<Log> {
+        Log::scan_telling(path, &|_| (), on_message)
+    }
+
+    /// The same; `on_bytes` hears how many bytes it has gone through so far.
+    ///
+    /// # Errors
+    ///
+    /// As [`Log::scan`].
+    pub fn scan_telling(
+        path: &Path,
+        on_bytes: &dyn Fn(u64),
+        on_message: &mut dyn FnMut(&Message) -> Result<()>,
+    ) -> Result<Log> {
         let file = File::open(path).map_err(Error::io("open", path))?;
         let size_bytes = file.metadata().map_err(Error::io("examine", path))?.len();
         let mut log = Log {
@@ -141,7 +157,8 @@ impl Log {
             segments: Vec::new(),
         };
         log.check_magic()?;
-        Walk { schemas: BTreeMap::new(), chunks: BTreeSet::new(), on_message }.run(&mut log)?;
+        let chunks = BTreeSet::new();
+        Walk { schemas: BTreeMap::new(), chunks, on_bytes, on_message }.run(&mut log)?;
         Ok(log)
     }
 
@@ -225,6 +242,7 @@ struct Walk<'f> {
     schemas: BTreeMap<u16, Arc<SchemaRecord>>,
     /// Where chunks were met, readable or not.
     chunks: BTreeSet<u64>,
+    on_bytes: &'f dyn Fn(u64),
     on_message: &'f mut dyn FnMut(&Message) -> Result<()>,
 }
 
@@ -236,6 +254,7 @@ impl Walk<'_> {
         let mut reader = BufReader::with_capacity(1 << 14, HashedFile::new(file));
         self.records(log, &mut reader)?;
         log.sha256 = reader.into_inner().finish().map_err(Error::io("read", &path))?;
+        (self.on_bytes)(log.size_bytes);
         Ok(())
     }
 
@@ -245,8 +264,13 @@ impl Walk<'_> {
         reader.seek(SeekFrom::Start(offset)).map_err(Error::io("read", &path))?;
         let mut body = Vec::new();
         let mut decompressor = Decompressor::default();
+        let mut told = 0;
 
         loop {
+            if offset >= told + TELL_EVERY_BYTES {
+                told = offset;
+                (self.on_bytes)(offset);
+            }
             let left = log.size_bytes - offset;
             let mut header = [0; RECORD_HEADER_BYTES as usize];
             if left < RECORD_HEADER_BYTES {

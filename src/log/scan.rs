@@ -26,8 +26,21 @@ impl Recording {
     ///
     /// As [`Log::scan`]. A message that cannot be decoded is counted in its topic, not an error.
     pub fn scan(path: &Path, clock: &ClockRule) -> Result<Vec<Recording>> {
+        Recording::scan_telling(path, clock, &|_| ())
+    }
+
+    /// The same; `on_bytes` hears how many bytes it has gone through so far.
+    ///
+    /// # Errors
+    ///
+    /// As [`Recording::scan`].
+    pub fn scan_telling(
+        path: &Path,
+        clock: &ClockRule,
+        on_bytes: &dyn Fn(u64),
+    ) -> Result<Vec<Recording>> {
         let mut builder = Builder::new(clock);
-        let log = Log::scan(path, &mut |message| {
+        let log = Log::scan_telling(path, on_bytes, &mut |message| {
             builder.add(message);
             Ok(())
         })?;

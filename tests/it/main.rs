@@ -29,6 +29,9 @@ mod writers;
 mod clocks;
 mod accounts;
 mod shares;
+mod progress;
+#[cfg(feature = "remote")]
+mod remote;
 mod rigs;
 mod conventions;
 mod real_drive;
