@@ -1,11 +1,11 @@
 //! A map as a picture file, north up: SVG or PNG by the ending of its name.
 
-use std::{fmt::Write as _, io::Write as _, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use glam::DVec2;
 
 use crate::{
-    atomic::AtomicFile,
+    atomic,
     error::{Error, Result},
     map::{
         canvas::Canvas,
@@ -44,9 +44,7 @@ pub fn draw(map: &RoadMap, path: &Path) -> Result<()> {
             });
         }
     };
-    let mut file = AtomicFile::create(path)?;
-    file.write_all(&bytes).map_err(Error::io("write", path))?;
-    file.commit()?;
+    atomic::write(path, &bytes)?;
     Ok(())
 }
 
