@@ -53,6 +53,10 @@ mod train_cli;
 mod run_schema;
 mod encoding;
 mod recording;
+mod map_fixtures;
+mod map_geometry;
+mod map_traps;
+mod maps;
 #[cfg(feature = "learning")]
 mod stats;
 #[cfg(feature = "learning")]
