@@ -8,6 +8,7 @@ use pmp::{
     error::Result,
     log::writer::LogOptions,
     sim::record::{RecordConfig, record_all},
+    towns::catalogue::write_all,
 };
 
 /// Make driving logs in an embedded simulator
@@ -21,6 +22,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Record(Record),
+    Towns(Towns),
 }
 
 /// Drive on a plain country road and record what the car senses, one MCAP file a drive
@@ -52,6 +54,17 @@ struct Record {
     jobs: usize,
 }
 
+/// Write seven towns as OpenDRIVE maps: Town01.xodr to Town07.xodr
+///
+/// Their paths go to stdout. A file that is there with other bytes is not overwritten.
+#[derive(Args)]
+#[command(after_help = "Example:\n  pmp-sim towns --out maps")]
+struct Towns {
+    /// Directory to put the maps in; made if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
+}
+
 const AFTER: &str = "\
 Examples:
   pmp-sim record --out logs                              8 drives of a minute each
@@ -63,8 +76,18 @@ The files are named plain-road-SEED-EPISODE.mcap; their paths go to stdout.
 Exit codes: 0 all drives recorded; 1 error; 2 bad usage";
 
 fn main() -> ExitCode {
-    let Cli { command: Command::Record(args) } = Cli::parse();
-    cli::main(|| record(args))
+    let Cli { command } = Cli::parse();
+    cli::main(|| match command {
+        Command::Record(args) => record(args),
+        Command::Towns(args) => towns(&args),
+    })
+}
+
+fn towns(args: &Towns) -> Result<Outcome> {
+    for map in write_all(&args.out)? {
+        cli::print(&format!("{}\n", map.display()))?;
+    }
+    Ok(Outcome::Done)
 }
 
 fn record(args: Record) -> Result<Outcome> {
