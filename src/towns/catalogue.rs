@@ -5,12 +5,23 @@ use std::path::{Path, PathBuf};
 use crate::{
     atomic,
     error::{Error, Result},
-    towns::{layout::lay_out, network::Network, opendrive, plan::Plan, town01},
+    towns::{
+        layout::lay_out, network::Network, opendrive, plan::Plan, town01, town02, town03, town04,
+        town05, town06, town07,
+    },
 };
 
 /// Plans of all towns, by name.
 pub fn plans() -> Vec<Plan> {
-    vec![town01::plan()]
+    vec![
+        town01::plan(),
+        town02::plan(),
+        town03::plan(),
+        town04::plan(),
+        town05::plan(),
+        town06::plan(),
+        town07::plan(),
+    ]
 }
 
 /// Write every town as `NAME.xodr` into a directory, which is made if it is missing. A file that

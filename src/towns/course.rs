@@ -158,7 +158,7 @@ impl Course {
         // Distances of both ends from the point where the tangents meet.
         let before_m = chord.perp_dot(to.ahead()) / sine;
         let behind_m = from.ahead().perp_dot(chord) / sine;
-        let is_straight = turn.abs() < 1e-4 && chord.perp_dot(from.ahead()).abs() < 1e-3;
+        let is_straight = turn.abs() < 1e-7 && chord.perp_dot(from.ahead()).abs() < 1e-6;
         let mut course = Course::default();
         if is_straight {
             course.push(from, chord.length(), 0.0, 0.0);

@@ -69,11 +69,11 @@ pub const COUNTRY_ROAD: Profile =
 pub const FIELD_LANE: Profile =
     Profile { corner_m: 7.0, ..Profile::two_way("rural", 50.0, 3.0, bare(1, 0.3)) };
 
-/// Three lanes in each direction, hard shoulders, a barrier between.
+/// Two lanes in each direction, hard shoulders, a barrier between.
 pub const MOTORWAY: Profile = Profile {
     median_m: 3.0,
     corner_m: 12.0,
-    ..Profile::two_way("motorway", 110.0, 3.6, bare(3, 2.5))
+    ..Profile::two_way("motorway", 110.0, 3.6, bare(2, 2.5))
 };
 
 /// A ramp of a motorway.
@@ -81,3 +81,10 @@ pub const RAMP: Profile = Profile {
     corner_m: 12.0,
     ..Profile::one_way("motorway", 60.0, 4.0, bare(1, 1.5), bare(0, 0.5))
 };
+
+/// One carriageway of an expressway: three lanes.
+pub const EXPRESSWAY: Profile =
+    Profile { corner_m: 10.0, ..Profile::one_way("town", 80.0, 3.5, bare(3, 1.0), bare(0, 0.5)) };
+
+/// A loop to turn back.
+pub const TURNAROUND: Profile = Profile::one_way("town", 30.0, 4.0, bare(1, 0.5), bare(0, 0.5));

@@ -21,8 +21,11 @@ const SHORTEST_TRIM_M: f64 = 3.0;
 /// Radius of the tip between arms that nobody turns between, m.
 const TIP_M: f64 = 1.0;
 
-/// Turns beyond this have a limit of their own, rad.
-const STRAIGHT_RAD: f64 = 0.5;
+/// Turns up to this are bends of the street, not turns into another, rad.
+const STRAIGHT_RAD: f64 = 0.6;
+
+/// Radius of such bends at least, m.
+const GENTLE_M: f64 = 15.0;
 
 /// The limit of turns, km/h.
 const TURN_LIMIT_KMH: f64 = 30.0;
@@ -141,6 +144,16 @@ pub fn trims_m(arms: &[Arm]) -> Vec<f64> {
         let meet = |own_m: f64, other_m: f64| (other_m + own_m * gap_rad.cos()) / gap_rad.sin();
         trims_m[i] = trims_m[i].max(meet(left_m, right_m) + round_m);
         trims_m[next] = trims_m[next].max(meet(right_m, left_m) + round_m);
+    }
+    for (i, j) in (0..arms.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        let turn_rad = wrapped(arms[i].pose.heading_rad - arms[j].pose.heading_rad - PI).abs();
+        if turn_rad < STRAIGHT_RAD {
+            let widest_m =
+                arms[i].kerbs_m().into_iter().chain(arms[j].kerbs_m()).fold(0.0, f64::max);
+            let eased_m = (turn_rad / 2.0).tan() * (GENTLE_M + widest_m);
+            trims_m[i] = trims_m[i].max(eased_m);
+            trims_m[j] = trims_m[j].max(eased_m);
+        }
     }
     trims_m
 }
