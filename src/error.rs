@@ -25,6 +25,10 @@ pub enum Error {
     #[error("{what} (byte {offset}) in {}", path.display())]
     Log { path: PathBuf, offset: u64, what: String, hint: Option<String> },
 
+    /// A map or route file, or an element of it, that cannot be used; lines count from 1.
+    #[error("{what} (<{element}>, line {line}) in {}", path.display())]
+    Map { path: PathBuf, line: u32, element: String, what: String, hint: Option<String> },
+
     /// A message definition that cannot be understood.
     #[error("message definition of {schema}, line {line}: {what}")]
     Definition { schema: String, line: usize, what: String },
@@ -124,6 +128,7 @@ impl Error {
     pub fn hint(&self) -> Option<String> {
         match self {
             Error::Log { hint, .. }
+            | Error::Map { hint, .. }
             | Error::Dataset { hint, .. }
             | Error::Run { hint, .. }
             | Error::Policy { hint, .. }

@@ -20,6 +20,7 @@ pub mod frame;
 pub mod log;
 pub mod policy;
 pub mod dataset;
+pub mod map;
 pub mod towns;
 pub mod sim;
 #[cfg(feature = "learning")]

@@ -7,6 +7,7 @@ use pmp::{
     cli::{self, Outcome},
     error::Result,
     log::writer::LogOptions,
+    map::{answers::MapAnswers, road_map::RoadMap},
     sim::record::{RecordConfig, record_all},
     towns::catalogue::write_all,
 };
@@ -22,6 +23,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Record(Record),
+    Map(Map),
     Towns(Towns),
 }
 
@@ -54,6 +56,32 @@ struct Record {
     jobs: usize,
 }
 
+/// Read an OpenDRIVE map: its figures, nearest lanes, routes and a picture of it
+///
+/// Places are in the map's frame: x east, y north, metres (CARLA's y has the opposite sign).
+/// Lanes are named road/section/lane. Lengths and costs are counted as CARLA counts its
+/// waypoints, between the first and the last half metre of each lane.
+#[derive(Args)]
+#[command(after_help = AFTER_MAP)]
+struct Map {
+    /// OpenDRIVE file
+    #[arg(value_name = "FILE.xodr")]
+    file: PathBuf,
+
+    /// Print JSON; answers to --points and --routes are in it as `points` and `routes`
+    #[arg(long)]
+    json: bool,
+
+    /// Find the nearest driving lane to each place of a file: [[x, y], ...]
+    #[arg(long, value_name = "FILE.json")]
+    points: Option<PathBuf>,
+
+    /// Plan the ways of a file: [{"start": "road/section/lane", "goal": "road/section/lane",
+    /// "lane_change_m": 30.0}, ...], from lane start to lane start
+    #[arg(long, value_name = "FILE.json")]
+    routes: Option<PathBuf>,
+}
+
 /// Write seven towns as OpenDRIVE maps: Town01.xodr to Town07.xodr
 ///
 /// Their paths go to stdout. A file that is there with other bytes is not overwritten.
@@ -75,10 +103,18 @@ The files are named plain-road-SEED-EPISODE.mcap; their paths go to stdout.
 
 Exit codes: 0 all drives recorded; 1 error; 2 bad usage";
 
+const AFTER_MAP: &str = "\
+Examples:
+  pmp-sim map Town01.xodr                                what the map has
+  pmp-sim map Town01.xodr --json --points places.json    the lanes that places lie on
+
+Exit codes: 0 done; 1 error; 2 bad usage";
+
 fn main() -> ExitCode {
     let Cli { command } = Cli::parse();
     cli::main(|| match command {
         Command::Record(args) => record(args),
+        Command::Map(args) => map(args),
         Command::Towns(args) => towns(&args),
     })
 }
@@ -87,6 +123,20 @@ fn towns(args: &Towns) -> Result<Outcome> {
     for map in write_all(&args.out)? {
         cli::print(&format!("{}\n", map.display()))?;
     }
+    Ok(Outcome::Done)
+}
+
+fn map(args: Map) -> Result<Outcome> {
+    let Map { file, json: _, points, routes } = args;
+    let map = RoadMap::read(&file)?;
+    let mut answers = MapAnswers::new(&map);
+    if let Some(points) = points {
+        answers = answers.with_points(&map, &points)?;
+    }
+    if let Some(routes) = routes {
+        answers = answers.with_routes(&map, &routes)?;
+    }
+    cli::print(&(serde_json::to_string_pretty(&answers).unwrap_or_default()))?;
     Ok(Outcome::Done)
 }
 

@@ -1,0 +1,177 @@
+//! What `pmp-sim map` answers, as JSON and as text.
+
+use std::{fs, path::Path};
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    error::{Error, Result},
+    map::{planner::Planner, road_map::RoadMap, xml::MAX_BYTES},
+};
+
+/// A map in figures, and answers to what was asked of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct MapAnswers {
+    pub roads: usize,
+    pub junctions: usize,
+    /// Lanes of the lane graph.
+    pub driving_lanes: usize,
+    /// Sum over the driving lanes, each from its first to its last half metre, as CARLA counts.
+    pub driving_lane_length_m: f64,
+    pub driving_lane_length_in_junctions_m: f64,
+    /// Nearest driving lanes; null in a map without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<Vec<Option<PointAnswer>>>,
+    /// Cheapest ways; null where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub routes: Option<Vec<Option<RouteAnswer>>>,
+}
+
+/// The nearest driving lane to a place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PointAnswer {
+    pub road: RoadName,
+    pub section: usize,
+    pub lane: i32,
+    /// Of the nearest point of the lane's centre line.
+    pub s_m: f64,
+    /// Of the place, from the road's reference line, positive left in the direction of `s`.
+    pub t_m: f64,
+    /// Direction of traffic, counter-clockwise from x, in (-pi, pi].
+    pub heading_rad: f64,
+    pub in_junction: bool,
+}
+
+/// A road's id: a number where it is one, as in nearly all maps, else its text.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum RoadName {
+    Number(u64),
+    Text(String),
+}
+
+impl RoadName {
+    fn new(id: &str) -> Self {
+        match id.parse::<u64>() {
+            Ok(number) if number.to_string() == id => RoadName::Number(number),
+            _ => RoadName::Text(id.to_string()),
+        }
+    }
+}
+
+/// A way from lane start to lane start.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RouteAnswer {
+    pub cost_m: f64,
+    /// `road/section/lane`, from the start to the goal.
+    pub lanes: Vec<String>,
+}
+
+/// A way that is asked for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RouteQuestion {
+    pub start: String,
+    pub goal: String,
+    /// What a lane change costs, m.
+    #[serde(default)]
+    pub lane_change_m: f64,
+}
+
+impl MapAnswers {
+    /// The figures of a map.
+    pub fn new(map: &RoadMap) -> Self {
+        let lanes = map.graph().lanes();
+        let in_junctions = lanes.iter().filter(|lane| lane.in_junction);
+        MapAnswers {
+            roads: map.opendrive().roads.len(),
+            junctions: map.opendrive().junctions.len(),
+            driving_lanes: lanes.len(),
+            driving_lane_length_m: lanes.iter().map(|lane| lane.waypoint_length_m).sum(),
+            driving_lane_length_in_junctions_m: in_junctions
+                .map(|lane| lane.waypoint_length_m)
+                .sum(),
+            points: None,
+            routes: None,
+        }
+    }
+
+    /// Read places from a file, `[[x, y], ...]`, and find their lanes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] or [`Error::Json`] if the file cannot be read.
+    pub fn with_points(mut self, map: &RoadMap, path: &Path) -> Result<Self> {
+        let places: Vec<[f64; 2]> = read_json(path)?;
+        self.points = Some(places.iter().map(|place| point(map, DVec2::from(*place))).collect());
+        Ok(self)
+    }
+
+    /// Read questions for ways from a file and plan them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] or [`Error::Json`] if the file cannot be read, [`Error::Config`] if a
+    /// question names a lane that the map does not have.
+    pub fn with_routes(mut self, map: &RoadMap, path: &Path) -> Result<Self> {
+        let questions: Vec<RouteQuestion> = read_json(path)?;
+        let routes = questions.iter().enumerate().map(|(i, question)| route(map, i, question));
+        self.routes = Some(routes.collect::<Result<_>>()?);
+        Ok(self)
+    }
+}
+
+fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
+    let bytes = fs::metadata(path).map_err(Error::io("read", path))?.len();
+    if bytes > MAX_BYTES {
+        let what = format!("{} has {bytes} bytes, at most {MAX_BYTES} are read", path.display());
+        return Err(Error::Config { key: "questions".into(), what, hint: None });
+    }
+    let text = fs::read(path).map_err(Error::io("read", path))?;
+    serde_json::from_slice(&text).map_err(Error::json(path))
+}
+
+fn point(map: &RoadMap, place_m: DVec2) -> Option<PointAnswer> {
+    let on_lane = map.nearest(place_m)?;
+    let lane = map.lane(on_lane.lane);
+    Some(PointAnswer {
+        road: RoadName::new(&map.road(on_lane.lane).id),
+        section: lane.key.section,
+        lane: lane.key.lane,
+        s_m: on_lane.s_m,
+        t_m: on_lane.t_m,
+        heading_rad: on_lane.heading_rad,
+        in_junction: lane.in_junction,
+    })
+}
+
+fn route(map: &RoadMap, index: usize, question: &RouteQuestion) -> Result<Option<RouteAnswer>> {
+    let RouteQuestion { start, goal, lane_change_m } = question;
+    let fail = |what: String, hint: &str| Error::Config {
+        key: format!("route {index}"),
+        what,
+        hint: Some(hint.to_string()),
+    };
+    if !(lane_change_m.is_finite() && *lane_change_m >= 0.0) {
+        let what = format!("`lane_change_m` is {lane_change_m}");
+        return Err(fail(what, "give metres, 0 or more"));
+    }
+    let find = |name: &str| {
+        let hint = "give lanes as \"road/section/lane\", as the answers to --points have them";
+        map.find(name).ok_or_else(|| fail(format!("the map has no driving lane `{name}`"), hint))
+    };
+    let (starts, goals) = (find(start)?, find(goal)?);
+    let Some(plan) = Planner::new(map, *lane_change_m).between_lanes(starts, goals) else {
+        return Ok(None);
+    };
+    let mut lanes: Vec<String> = plan.lanes.iter().map(|lane| map.name(*lane)).collect();
+    // A contracted lane was asked for by its own name and is answered by it.
+    if let [first, ..] = &mut lanes[..] {
+        first.clone_from(start);
+    }
+    if let [.., last] = &mut lanes[..] {
+        last.clone_from(goal);
+    }
+    Ok(Some(RouteAnswer { cost_m: plan.cost_m, lanes }))
+}
