@@ -2,11 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::towns::{
-    course::{Course, Pose, wrapped},
-    movement::{Exit, movements},
-    network::{Connection, Road, Tie},
-    profile::{Lane, Profile, Section, Use},
+use crate::{
+    dataset::ego::wrap_angle,
+    towns::{
+        course::{Course, Pose},
+        movement::{Exit, movements},
+        network::{Connection, Road, Tie},
+        profile::{Lane, Profile, Section, Use},
+    },
 };
 
 /// Turns sharper than this are not driven, rad.
@@ -146,7 +149,7 @@ pub fn trims_m(arms: &[Arm]) -> Vec<f64> {
         trims_m[next] = trims_m[next].max(meet(right_m, left_m) + round_m);
     }
     for (i, j) in (0..arms.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
-        let turn_rad = wrapped(arms[i].pose.heading_rad - arms[j].pose.heading_rad - PI).abs();
+        let turn_rad = wrap_angle(arms[i].pose.heading_rad - arms[j].pose.heading_rad - PI).abs();
         if turn_rad < STRAIGHT_RAD {
             let widest_m =
                 arms[i].kerbs_m().into_iter().chain(arms[j].kerbs_m()).fold(0.0, f64::max);
@@ -245,7 +248,7 @@ impl<'arms> Crossing<'arms> {
         let course = Course::joining(from.entry(lanes[0]), to.exit(lanes[1]));
         let section = Section { s_m: 0.0, length_m: course.length_m(), left: Vec::new(), right };
         let limit_kmh = from.profile.limit_kmh.min(to.profile.limit_kmh);
-        let turn_rad = wrapped(course.end().heading_rad - course.start().heading_rad);
+        let turn_rad = wrap_angle(course.end().heading_rad - course.start().heading_rad);
         self.roads.push(Road {
             id,
             name: String::new(),
@@ -274,7 +277,7 @@ fn ways(arms: &[Arm], from: usize) -> Vec<(usize, usize, usize)> {
         return Vec::new();
     }
     let turn_rad =
-        |to: usize| wrapped(arms[to].pose.heading_rad - arms[from].pose.heading_rad - PI);
+        |to: usize| wrap_angle(arms[to].pose.heading_rad - arms[from].pose.heading_rad - PI);
     let may_be_left_by = |to: &usize| {
         *to != from && arms[*to].lanes_out() > 0 && turn_rad(*to).abs() <= SHARPEST_RAD
     };

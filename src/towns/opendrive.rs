@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use crate::towns::{
-    course::{Piece, Shape},
-    network::{Crosswalk, Junction, Network, Road, Tie},
-    profile::{Lane, Section, Use},
+use crate::{
+    map::reference_line::{Piece, Shape},
+    towns::{
+        network::{Crosswalk, Junction, Network, Road, Tie},
+        profile::{Lane, Section, Use},
+    },
 };
 
 /// Extent of a crosswalk along the road, m.
@@ -110,11 +112,7 @@ fn add_road(xml: &mut Xml, road: &Road) {
     xml.empty("speed", &[("max", &number(road.limit_kmh)), ("unit", "km/h")]);
     xml.close("type");
     xml.open("planView", &[]);
-    let mut s_m = 0.0;
-    for piece in &road.course.0 {
-        add_piece(xml, s_m, piece);
-        s_m += piece.length_m;
-    }
+    road.course.pieces().iter().for_each(|piece| add_piece(xml, piece));
     xml.close("planView");
     xml.open("elevationProfile", &[]);
     xml.empty(
@@ -151,38 +149,34 @@ fn add_tie(xml: &mut Xml, which: &str, tie: Tie) {
     xml.empty(which, &attributes);
 }
 
-fn add_piece(xml: &mut Xml, s_m: f64, piece: &Piece) {
-    let numbers = [
-        s_m,
-        piece.start.position_m.x,
-        piece.start.position_m.y,
-        piece.start.heading_rad,
-        piece.length_m,
-    ]
-    .map(number);
+fn add_piece(xml: &mut Xml, piece: &Piece) {
+    let numbers = [piece.s_m, piece.start_m.x, piece.start_m.y, piece.heading_rad, piece.length_m];
+    let numbers = numbers.map(number);
     let [s, x, y, heading, length] = numbers.each_ref().map(String::as_str);
     xml.open("geometry", &[("s", s), ("x", x), ("y", y), ("hdg", heading), ("length", length)]);
     match piece.shape {
-        Shape::Clothoid { start_per_m: 0.0, end_per_m: 0.0 } => xml.empty("line", &[]),
-        Shape::Clothoid { start_per_m, end_per_m } if start_per_m == end_per_m => {
-            xml.empty("arc", &[("curvature", &number(start_per_m))]);
+        Shape::Line => xml.empty("line", &[]),
+        Shape::Arc { curvature_per_m } => {
+            xml.empty("arc", &[("curvature", &number(curvature_per_m))]);
         }
-        Shape::Clothoid { start_per_m, end_per_m } => {
-            xml.empty(
-                "spiral",
-                &[("curvStart", &number(start_per_m)), ("curvEnd", &number(end_per_m))],
-            );
+        Shape::Spiral { start_per_m, end_per_m } => {
+            let ends = [("curvStart", number(start_per_m)), ("curvEnd", number(end_per_m))];
+            xml.empty("spiral", &ends.each_ref().map(|(key, value)| (*key, value.as_str())));
         }
-        Shape::Cubic { forward_m, left_m } => {
-            let (u, v) = (forward_m.map(number), left_m.map(number));
+        Shape::Poly3 { v } => add_cubics(xml, "poly3", &["a", "b", "c", "d"], &v, &[]),
+        Shape::ParamPoly3 { u, v, p_end: _ } => {
             let keys = ["aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV"];
-            let values = u.iter().chain(&v).map(String::as_str);
-            let mut attributes: Vec<(&str, &str)> = keys.into_iter().zip(values).collect();
-            attributes.push(("pRange", "normalized"));
-            xml.empty("paramPoly3", &attributes);
+            add_cubics(xml, "paramPoly3", &keys, &[u, v].concat(), &[("pRange", "normalized")]);
         }
     }
     xml.close("geometry");
+}
+
+fn add_cubics(xml: &mut Xml, name: &str, keys: &[&str], values: &[f64], more: &[(&str, &str)]) {
+    let values: Vec<String> = values.iter().map(|value| number(*value)).collect();
+    let cubics = keys.iter().copied().zip(values.iter().map(String::as_str));
+    let attributes: Vec<(&str, &str)> = cubics.chain(more.iter().copied()).collect();
+    xml.empty(name, &attributes);
 }
 
 fn polynomial(
