@@ -21,3 +21,4 @@ pub mod town05;
 pub mod town06;
 pub mod town07;
 pub mod catalogue;
+pub mod scenery;
