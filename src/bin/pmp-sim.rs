@@ -1,4 +1,4 @@
-//! `pmp-sim`: drives that the package makes itself.
+//! `pmp-sim`: drives that the package makes itself, and the maps for them.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -7,12 +7,12 @@ use pmp::{
     cli::{self, Outcome},
     error::Result,
     log::writer::LogOptions,
-    map::{answers::MapAnswers, road_map::RoadMap},
+    map::{answers::MapAnswers, picture::draw, road_map::RoadMap},
     sim::record::{RecordConfig, record_all},
     towns::catalogue::write_all,
 };
 
-/// Make driving logs in an embedded simulator
+/// Make driving logs in an embedded simulator, and look at maps
 #[derive(Parser)]
 #[command(version, after_help = AFTER)]
 struct Cli {
@@ -80,6 +80,10 @@ struct Map {
     /// "lane_change_m": 30.0}, ...], from lane start to lane start
     #[arg(long, value_name = "FILE.json")]
     routes: Option<PathBuf>,
+
+    /// Draw the map, north up; SVG or PNG by the ending of the name. Replaces what is there
+    #[arg(long, value_name = "FILE.png|svg")]
+    picture: Option<PathBuf>,
 }
 
 /// Write seven towns as OpenDRIVE maps: Town01.xodr to Town07.xodr
@@ -106,7 +110,10 @@ Exit codes: 0 all drives recorded; 1 error; 2 bad usage";
 const AFTER_MAP: &str = "\
 Examples:
   pmp-sim map Town01.xodr                                what the map has
+  pmp-sim map Town01.xodr --picture Town01.png           and what it looks like
   pmp-sim map Town01.xodr --json --points places.json    the lanes that places lie on
+
+JSON goes to stdout, notes on what was mended or left out to stderr.
 
 Exit codes: 0 done; 1 error; 2 bad usage";
 
@@ -127,7 +134,7 @@ fn towns(args: &Towns) -> Result<Outcome> {
 }
 
 fn map(args: Map) -> Result<Outcome> {
-    let Map { file, json: _, points, routes } = args;
+    let Map { file, json, points, routes, picture } = args;
     let map = RoadMap::read(&file)?;
     let mut answers = MapAnswers::new(&map);
     if let Some(points) = points {
@@ -136,7 +143,13 @@ fn map(args: Map) -> Result<Outcome> {
     if let Some(routes) = routes {
         answers = answers.with_routes(&map, &routes)?;
     }
-    cli::print(&(serde_json::to_string_pretty(&answers).unwrap_or_default()))?;
+    if let Some(picture) = picture {
+        draw(&map, &picture)?;
+    }
+    for note in map.notes() {
+        eprintln!("note: {note}");
+    }
+    cli::print(&if json { answers.json() } else { answers.text(&map) })?;
     Ok(Outcome::Done)
 }
 

@@ -1,6 +1,6 @@
 //! What `pmp-sim map` answers, as JSON and as text.
 
-use std::{fs, path::Path};
+use std::{fmt, fs, path::Path};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,17 @@ pub struct PointAnswer {
     pub in_junction: bool,
 }
 
+impl PointAnswer {
+    fn text(&self) -> String {
+        let PointAnswer { road, section, lane, s_m, t_m, heading_rad, in_junction } = self;
+        let junction = if *in_junction { ", in a junction" } else { "" };
+        let heading = heading_rad.to_degrees();
+        format!(
+            "{road}/{section}/{lane} at s {s_m:.2} m, t {t_m:.2} m, heading {heading:.1} deg{junction}\n"
+        )
+    }
+}
+
 /// A road's id: a number where it is one, as in nearly all maps, else its text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -60,12 +71,27 @@ impl RoadName {
     }
 }
 
+impl fmt::Display for RoadName {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RoadName::Number(number) => number.fmt(out),
+            RoadName::Text(text) => text.fmt(out),
+        }
+    }
+}
+
 /// A way from lane start to lane start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RouteAnswer {
     pub cost_m: f64,
     /// `road/section/lane`, from the start to the goal.
     pub lanes: Vec<String>,
+}
+
+impl RouteAnswer {
+    fn text(&self) -> String {
+        format!("{:.1} m: {}\n", self.cost_m, self.lanes.join(" -> "))
+    }
 }
 
 /// A way that is asked for.
@@ -95,6 +121,37 @@ impl MapAnswers {
             points: None,
             routes: None,
         }
+    }
+
+    /// The JSON that the command prints.
+    pub fn json(&self) -> String {
+        // Numbers and texts alone: nothing that JSON could refuse.
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text + "\n"
+    }
+
+    /// A short summary for people.
+    pub fn text(&self, map: &RoadMap) -> String {
+        let lanes = map.graph().lanes();
+        let exact_m: f64 = lanes.iter().map(|lane| lane.length_m).sum();
+        let mut text = format!(
+            "{} roads, {} junctions\n\
+             {} driving lanes: {:.1} m along their centres, {:.1} m between half metres, {:.1} m \
+             of them in junctions\n",
+            self.roads,
+            self.junctions,
+            self.driving_lanes,
+            exact_m,
+            self.driving_lane_length_m,
+            self.driving_lane_length_in_junctions_m,
+        );
+        for point in self.points.iter().flatten() {
+            text += &point.as_ref().map_or("no driving lane\n".to_string(), PointAnswer::text);
+        }
+        for route in self.routes.iter().flatten() {
+            text += &route.as_ref().map_or("no way\n".to_string(), RouteAnswer::text);
+        }
+        text
     }
 
     /// Read places from a file, `[[x, y], ...]`, and find their lanes.

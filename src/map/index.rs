@@ -88,8 +88,10 @@ impl LaneIndex {
         LaneIndex { pieces: RTree::bulk_load(pieces) }
     }
 
-    /// The nearest lane, exact in `s`; of lanes equally near the first of the graph. None in a
-    /// map without driving lanes.
+    /// The nearest lane, exact in `s`; none in a map without driving lanes.
+    ///
+    /// Of lanes equally near, as where ways through a junction begin together, the last of the
+    /// graph: exports write connecting roads after those that they connect.
     pub fn nearest(&self, map: &OpenDrive, graph: &LaneGraph, place_m: DVec2) -> Option<OnLane> {
         let mut best: Option<OnLane> = None;
         for (piece, distance2) in
@@ -101,7 +103,7 @@ impl LaneIndex {
             let found = locate(map, graph, piece.data, place_m);
             let is_nearer = |best: OnLane| {
                 let (gain_m, same) = (best.distance_m - found.distance_m, 1e-9);
-                gain_m > same || (gain_m > -same && found.lane < best.lane)
+                gain_m > same || (gain_m > -same && found.lane > best.lane)
             };
             if best.is_none_or(is_nearer) {
                 best = Some(found);

@@ -22,4 +22,7 @@ pub mod graph;
 pub mod index;
 pub mod road_map;
 pub mod planner;
+pub mod canvas;
+pub mod shapes;
+pub mod picture;
 pub mod answers;

@@ -59,9 +59,23 @@ impl RoadMap {
         &self.opendrive.roads[self.lane(id).key.road]
     }
 
-    /// Steps of lane offsets that missed the start of their section and were moved there.
-    pub fn mended_lane_offsets(&self) -> usize {
-        self.mended_lane_offsets
+    /// What was mended or left out, with its count, in words; nothing in a sound map.
+    pub fn notes(&self) -> Vec<String> {
+        let broken = self.graph.broken_links();
+        let counts = [
+            (
+                self.mended_lane_offsets,
+                "steps of a lane offset missed the start of their section and were moved there",
+            ),
+            (
+                self.graph.contracted(),
+                "driving lanes shorter than half a metre were contracted into those they lead to",
+            ),
+            (broken.to_roads, "links to roads or junctions that are not in the map were left out"),
+            (broken.to_lanes, "links to lanes that are not in the map were left out"),
+        ];
+        let told = counts.iter().filter(|(count, _)| *count > 0);
+        told.map(|(count, what)| format!("{count} {what}")).collect()
     }
 
     /// The lane nearest to a place, map frame, m; none in a map without driving lanes.
