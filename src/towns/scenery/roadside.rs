@@ -19,6 +19,7 @@ pub enum Character {
     Town,
     /// No side-walk on either side.
     Country,
+    /// No side-walk, and fast or one-way: motorways and their ramps.
     Motorway,
     /// A side-walk only on the other side: the inside of a ring.
     Bare,
@@ -70,9 +71,12 @@ impl<'map> Roadside<'map> {
         let driving = lanes.iter().filter(|lane| lane.kind == LaneKind::Driving);
         let (from_m, _) = road.section_range_m(section);
         let limit_mps = road.speed_limit_mps(section, 0, from_m);
+        let is_driven = |is_left: bool| driving.clone().any(|lane| (lane.id > 0) == is_left);
+        let is_fast = limit_mps.is_some_and(|mps| mps > MOTORWAY_MPS);
+        let is_one_way = !(is_driven(true) && is_driven(false));
         let character = match (is_walked(is_left), is_walked(!is_left)) {
             (true, _) => Character::Town,
-            _ if limit_mps.is_some_and(|mps| mps > MOTORWAY_MPS) => Character::Motorway,
+            (false, false) if is_fast || is_one_way => Character::Motorway,
             (false, true) => Character::Bare,
             (false, false) => Character::Country,
         };
