@@ -23,6 +23,7 @@ pub mod noise;
 pub mod policy;
 pub mod dataset;
 pub mod map;
+pub mod towns;
 pub mod world;
 pub mod sim;
 #[cfg(feature = "learning")]

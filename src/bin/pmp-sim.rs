@@ -9,6 +9,10 @@ use pmp::{
     log::writer::LogOptions,
     map::{answers::MapAnswers, picture::draw, road_map::RoadMap},
     sim::record::{RecordConfig, record_all},
+    towns::{
+        catalogue::write_all,
+        scenery::{collection::Scenery, drawing::outlines},
+    },
 };
 
 /// Make driving logs in an embedded simulator, and look at maps
@@ -23,6 +27,7 @@ struct Cli {
 enum Command {
     Record(Record),
     Map(Map),
+    Towns(Towns),
 }
 
 /// Drive on a plain country road and record what the car senses, one MCAP file a drive
@@ -82,6 +87,21 @@ struct Map {
     /// Draw the map, north up; SVG or PNG by the ending of the name. Replaces what is there
     #[arg(long, value_name = "FILE.png|svg")]
     picture: Option<PathBuf>,
+
+    /// Draw the buildings, trees and fields of this seed as well
+    #[arg(long, value_name = "SEED", requires = "picture")]
+    scenery: Option<u64>,
+}
+
+/// Write seven towns as OpenDRIVE maps: Town01.xodr to Town07.xodr
+///
+/// Their paths go to stdout. A file that is there with other bytes is not overwritten.
+#[derive(Args)]
+#[command(after_help = AFTER_TOWNS)]
+struct Towns {
+    /// Directory to put the maps in; made if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    out: PathBuf,
 }
 
 const AFTER: &str = "\
@@ -98,22 +118,31 @@ const AFTER_MAP: &str = "\
 Examples:
   pmp-sim map Town01.xodr                                what the map has
   pmp-sim map Town01.xodr --picture Town01.png           and what it looks like
+  pmp-sim map Town01.xodr --picture Town01.png --scenery 1   with houses and trees
   pmp-sim map Town01.xodr --json --points places.json    the lanes that places lie on
 
 JSON goes to stdout, notes on what was mended or left out to stderr.
 
 Exit codes: 0 done; 1 error; 2 bad usage";
 
+const AFTER_TOWNS: &str = "\
+Examples:
+  pmp-sim towns --out maps                                   seven files
+  pmp-sim map maps/Town03.xodr --picture town3.png           what one looks like
+
+Exit codes: 0 all towns are there; 1 error; 2 bad usage";
+
 fn main() -> ExitCode {
     let Cli { command } = Cli::parse();
     cli::main(|| match command {
         Command::Record(args) => record(args),
         Command::Map(args) => map(args),
+        Command::Towns(args) => towns(&args),
     })
 }
 
 fn map(args: Map) -> Result<Outcome> {
-    let Map { file, json, points, routes, picture } = args;
+    let Map { file, json, points, routes, picture, scenery } = args;
     let map = RoadMap::read(&file)?;
     let mut answers = MapAnswers::new(&map);
     if let Some(points) = points {
@@ -123,7 +152,8 @@ fn map(args: Map) -> Result<Outcome> {
         answers = answers.with_routes(&map, &routes)?;
     }
     if let Some(picture) = picture {
-        draw(&map, &picture)?;
+        let beside = scenery.map(|seed| outlines(&Scenery::derive(&map, seed)));
+        draw(&map, &beside.unwrap_or_default(), &picture)?;
     }
     for note in map.notes() {
         eprintln!("note: {note}");
@@ -141,6 +171,13 @@ fn record(args: Record) -> Result<Outcome> {
     bar.finish_and_clear();
     for log in logs {
         cli::print(&format!("{}\n", log.display()))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn towns(args: &Towns) -> Result<Outcome> {
+    for map in write_all(&args.out)? {
+        cli::print(&format!("{}\n", map.display()))?;
     }
     Ok(Outcome::Done)
 }

@@ -23,15 +23,16 @@ const LARGEST_SCALE: f64 = 8.0;
 /// Empty border, m.
 const MARGIN_M: f64 = 15.0;
 
-/// Draw a map.
+/// Draw a map, and on top of it what stands `beside` its roads.
 ///
 /// # Errors
 ///
 /// [`Error::Config`] if the file ends neither in `.svg` nor in `.png`, [`Error::Io`] if it
 /// cannot be written.
-pub fn draw(map: &RoadMap, path: &Path) -> Result<()> {
+pub fn draw(map: &RoadMap, beside: &[Shape], path: &Path) -> Result<()> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    let shapes = shapes(map);
+    let mut shapes = shapes(map);
+    shapes.extend_from_slice(beside);
     let frame = Frame::around(&shapes);
     let bytes = match ending.to_ascii_lowercase().as_str() {
         "svg" => svg(&shapes, &frame).into_bytes(),

@@ -51,6 +51,7 @@ enum Layer {
     Crossing,
     Mark,
     Arrow,
+    Thing,
 }
 
 /// A filled outline in the map's frame, m.
@@ -60,6 +61,13 @@ pub struct Shape {
     pub colour: Colour,
     storey: i64,
     layer: Layer,
+}
+
+impl Shape {
+    /// A thing on the ground, painted over the roads.
+    pub fn thing(outline_m: Vec<DVec2>, colour: Colour) -> Shape {
+        Shape { outline_m, colour, storey: 0, layer: Layer::Thing }
+    }
 }
 
 /// All that is to be painted, in that order.

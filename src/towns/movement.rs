@@ -1,0 +1,69 @@
+//! Which lane of a junction's arm leads into which lane of another.
+
+/// Turns up to this count as going straight on, rad.
+const STRAIGHT_RAD: f64 = 0.79;
+
+/// Who comes in at such an angle joins from the side, rad.
+const JOINING_RAD: f64 = 0.14;
+
+/// An arm that may be left by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exit {
+    /// Change of heading on the way into it, positive to the left.
+    pub turn_rad: f64,
+    pub lanes: usize,
+}
+
+/// A way through a junction; lanes are counted from the left of the direction of travel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Movement {
+    pub exit: usize,
+    pub from_lane: usize,
+    pub to_lane: usize,
+}
+
+/// All ways for `lanes` lanes that come in. `exits` are sorted from left to right.
+///
+/// Straight on keeps its lanes; lanes that find none there turn, to the right if that can be done.
+/// Where nothing leads straight on, the lanes share the turns.
+pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
+    let straightest = (0..exits.len())
+        .min_by(|&a, &b| exits[a].turn_rad.abs().total_cmp(&exits[b].turn_rad.abs()))
+        .filter(|&main| exits[main].turn_rad.abs() <= STRAIGHT_RAD);
+    let mut found = Vec::new();
+    let mut add = |exit: usize, from_lanes: std::ops::Range<usize>, on_right: bool| {
+        let width = exits[exit].lanes;
+        for from_lane in from_lanes.clone() {
+            let to_lane = match on_right {
+                true => width.saturating_sub(from_lanes.end - from_lane),
+                false => (from_lane - from_lanes.start).min(width - 1),
+            };
+            found.push(Movement { exit, from_lane, to_lane });
+        }
+    };
+    let Some(main) = straightest else {
+        let lefts = exits.iter().filter(|exit| exit.turn_rad > 0.0).count();
+        let shared = match lefts {
+            0 => 0,
+            all if all == exits.len() => lanes,
+            _ => lanes.div_ceil(2),
+        };
+        let first_right = if lefts < exits.len() { shared.min(lanes - 1) } else { lanes };
+        (0..lefts).for_each(|exit| add(exit, 0..shared, false));
+        (lefts..exits.len()).for_each(|exit| add(exit, first_right..lanes, true));
+        return found;
+    };
+    let (has_left, has_right) = (main > 0, main + 1 < exits.len());
+    let spare = lanes.saturating_sub(exits[main].lanes);
+    let straight = match (has_left, has_right) {
+        (_, true) => 0..lanes - spare,
+        (true, false) => spare..lanes,
+        (false, false) => 0..lanes,
+    };
+    let left = if has_right { 0..1 } else { 0..spare.max(1) };
+    let right = if has_right { lanes - spare.max(1)..lanes } else { 0..0 };
+    (0..main).for_each(|exit| add(exit, left.clone(), false));
+    add(main, straight, exits[main].turn_rad > JOINING_RAD);
+    (main + 1..exits.len()).for_each(|exit| add(exit, right.clone(), true));
+    found
+}
