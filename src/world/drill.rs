@@ -1,19 +1,20 @@
 //! Many drives of the expert, to know that the world can be driven in: who arrives, and why not.
 
-use std::{ops::RangeInclusive, sync::Arc};
+use std::{ops::Range, sync::Arc};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    map::road_map::RoadMap,
+    map::{planner::Planner, road_map::RoadMap, route::MapRoute},
     noise::{Noise, Purpose},
+    towns::scenery::{collection::Scenery, things::Thing},
     world::{
         density::{Counts, Density},
         ego::{Car, SEDAN},
         episode::{Outcome, drive},
-        errand::draw_route,
         expert::{Expert, ExpertConfig},
+        footprint::Footprint,
         obstacles::Obstacles,
         paving::pave,
         route::Route,
@@ -22,6 +23,12 @@ use crate::{
         world::{Start, World},
     },
 };
+
+/// Lengths of routes, m (paper, section III.B).
+pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
+
+/// What a lane change costs the planner, m.
+const LANE_CHANGE_M: f64 = 30.0;
 
 /// A town, ready to be driven in.
 #[derive(Clone, Debug)]
@@ -33,9 +40,17 @@ pub struct Town {
 }
 
 impl Town {
-    pub fn new(name: String, map: RoadMap, obstacles: Obstacles) -> Town {
+    /// A town with scenery by seed.
+    pub fn new(name: String, map: RoadMap, seed: u64) -> Town {
         let streets = Arc::new(pave(&map));
-        Town { name, map: Arc::new(map), streets, obstacles: Arc::new(obstacles) }
+        let scenery = Scenery::derive(&map, seed);
+        let standing = scenery.things().iter().filter(|thing| thing.kind.is_obstacle());
+        let footprint = |thing: &Thing| {
+            let Thing { footprint, .. } = thing;
+            Footprint::new(footprint.centre_m, footprint.heading_rad, footprint.half_m)
+        };
+        let obstacles = Arc::new(Obstacles::new(standing.map(footprint).collect()));
+        Town { name, map: Arc::new(map), streets, obstacles }
     }
 }
 
@@ -45,7 +60,7 @@ pub struct Drill {
     pub densities: Vec<Density>,
     /// Of each town and density.
     pub episodes: u32,
-    pub lengths_m: RangeInclusive<f64>,
+    pub lengths_m: Range<f64>,
     pub seed: u64,
     pub expert: ExpertConfig,
 }
@@ -86,8 +101,10 @@ pub fn run(towns: &[Town], drill: &Drill, on: &(dyn Fn(&Drive) + Sync)) -> Vec<D
 
 fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Drive> {
     // The same routes whatever the traffic, and others in each town and level for all else.
-    let mut noise = Noise::new(drill.seed, episode, Purpose::Road);
-    let route = Arc::new(draw_route(&town.map, &town.streets, &mut noise, &drill.lengths_m)?);
+    let planner = Planner::new(&town.map, LANE_CHANGE_M);
+    let draw = drill.seed << 32 | u64::from(episode);
+    let route = MapRoute::random(&planner, draw, drill.lengths_m.clone())?;
+    let route = Arc::new(Route::new(&route, &town.streets)?);
     let stream = episode << 2 | traffic as u32;
     let counts = traffic.draw(&mut Noise::new(drill.seed, stream, Purpose::Scenery));
     let mut world = World::new(Start {

@@ -2,7 +2,11 @@
 
 use glam::DVec2;
 
-use crate::{frame::Command, world::streets::LaneId};
+use crate::{
+    frame::{Command, ROUTE_SPACING_M},
+    map::route::MapRoute,
+    world::streets::{LaneId, Streets},
+};
 
 /// A waypoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +16,7 @@ pub struct Waypoint {
     pub height_m: f64,
     /// From the start of the route, m.
     pub at_m: f64,
-    /// The lane that it belongs to; in the middle of a lane change that of the target.
+    /// The lane that it belongs to; during a lane change the one nearer by.
     pub lane: LaneId,
     /// Arc length on the lane, m.
     pub s_m: f64,
@@ -23,11 +27,10 @@ pub struct Waypoint {
     pub command: Command,
 }
 
-/// Waypoints in order, evenly spaced.
+/// Waypoints in order, [`ROUTE_SPACING_M`] apart.
 #[derive(Clone, Debug)]
 pub struct Route {
     waypoints: Vec<Waypoint>,
-    step_m: f64,
 }
 
 /// How far back and ahead of the last place the nearest waypoint is looked for, m.
@@ -35,9 +38,26 @@ const BACK_M: f64 = 5.0;
 const AHEAD_M: f64 = 30.0;
 
 impl Route {
-    /// Waypoints every `step_m`, two at least.
-    pub fn new(waypoints: Vec<Waypoint>, step_m: f64) -> Route {
-        Route { waypoints, step_m }
+    /// A route over the map that the streets were paved from; `None` if it has no two points.
+    pub fn new(route: &MapRoute, streets: &Streets) -> Option<Route> {
+        let points = &route.points;
+        let positions: Vec<DVec2> = points.iter().map(|p| p.position_m.truncate()).collect();
+        let waypoint = |(index, point): (usize, &crate::map::route::RoutePoint)| {
+            let lane = &streets.lanes[point.lane];
+            Waypoint {
+                position_m: positions[index],
+                height_m: point.position_m.z,
+                at_m: index as f64 * ROUTE_SPACING_M,
+                lane: point.lane,
+                s_m: lane.course.project(positions[index]).0,
+                in_junction: lane.junction.is_some(),
+                limit_mps: lane.limit_mps,
+                curvature_per_m: curvature_per_m(&positions, index),
+                command: point.command,
+            }
+        };
+        let waypoints: Vec<Waypoint> = points.iter().enumerate().map(waypoint).collect();
+        (waypoints.len() > 1).then_some(Route { waypoints })
     }
 
     pub fn waypoints(&self) -> &[Waypoint] {
@@ -45,7 +65,7 @@ impl Route {
     }
 
     pub fn length_m(&self) -> f64 {
-        (self.waypoints.len() - 1) as f64 * self.step_m
+        (self.waypoints.len() - 1) as f64 * ROUTE_SPACING_M
     }
 
     pub fn goal_m(&self) -> DVec2 {
@@ -54,7 +74,7 @@ impl Route {
 
     /// Index of the waypoint at a distance from the start.
     pub fn index_at(&self, at_m: f64) -> usize {
-        ((at_m / self.step_m).round().max(0.0) as usize).min(self.waypoints.len() - 1)
+        ((at_m / ROUTE_SPACING_M).round().max(0.0) as usize).min(self.waypoints.len() - 1)
     }
 
     /// The waypoint at a distance from the start.
@@ -76,9 +96,9 @@ impl Route {
         let distance = |index: usize| self.waypoints[index].position_m.distance_squared(position_m);
         let nearest = (from..=to).min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
         let index = nearest.unwrap_or(from);
-        let along = self.forward(index as f64 * self.step_m);
+        let along = self.forward(index as f64 * ROUTE_SPACING_M);
         let beyond = along.dot(position_m - self.waypoints[index].position_m);
-        let at_m = index as f64 * self.step_m + beyond.clamp(-self.step_m, self.step_m);
+        let at_m = index as f64 * ROUTE_SPACING_M + beyond.clamp(-ROUTE_SPACING_M, ROUTE_SPACING_M);
         at_m.clamp(0.0, self.length_m())
     }
 
@@ -98,4 +118,15 @@ impl Route {
         }
         (lanes, self.waypoints[from].s_m)
     }
+}
+
+/// Curvature from two chords of 2 m, 1/m, without sign.
+fn curvature_per_m(positions: &[DVec2], index: usize) -> f64 {
+    const CHORD_M: f64 = 2.0;
+    let reach = (CHORD_M / ROUTE_SPACING_M) as usize;
+    let (from, to) = (index.saturating_sub(reach), (index + reach).min(positions.len() - 1));
+    let (before, after) = (positions[index] - positions[from], positions[to] - positions[index]);
+    let length_m = 0.5 * (before.length() + after.length());
+    let is_end = from == index || to == index;
+    if is_end { 0.0 } else { before.angle_to(after).abs() / length_m.max(ROUTE_SPACING_M) }
 }
