@@ -22,6 +22,9 @@ const FINE_M: f64 = 0.2;
 /// Longest stretch that a lane change is spread over, m.
 const CHANGE_M: f64 = 40.0;
 
+/// Where there is less room than this for a lane change, it goes on into the next lanes, m.
+const SHORTEST_CHANGE_M: f64 = 12.0;
+
 /// Lanes that do not meet are joined over this many times the gap, at least `JOIN_M`.
 const JOIN_SHARE: f64 = 15.0;
 const JOIN_M: f64 = 5.0;
@@ -139,7 +142,8 @@ fn stretches(map: &RoadMap, lanes: &[LaneId]) -> Vec<Range<usize>> {
     stretches
 }
 
-/// Add a stretch to a way: its lane changes are spread evenly over it.
+/// Add a stretch to a way: its lane changes are spread evenly over it, and it leads on from
+/// where the way ends.
 fn lay_out(
     map: &RoadMap,
     lanes: &[LaneId],
@@ -148,6 +152,10 @@ fn lay_out(
     way: &mut Vec<(DVec3, LaneId)>,
 ) {
     let length_m = (to_m - from_m).abs();
+    let start_m =
+        way.last().map_or_else(|| map.centre(lanes[0], from_m).position_m, |(last_m, _)| *last_m);
+    let room_m = length_m / (lanes.len() - 1).max(1) as f64;
+    let lanes = if room_m < SHORTEST_CHANGE_M { &lanes[lanes.len() - 1..] } else { lanes };
     let changes = lanes.len() - 1;
     let share_m = length_m / changes.max(1) as f64;
     let change_m = share_m.min(CHANGE_M);
@@ -163,8 +171,8 @@ fn lay_out(
         let lane = lanes[index + usize::from(across > 0.5)];
         (place(index).lerp(place(index + 1), across), lane)
     };
-    let gap_m = way.last().map_or(DVec3::ZERO, |(last_m, _)| *last_m - at(0.0).0);
-    let join_m = (JOIN_SHARE * gap_m.length()).max(JOIN_M).min(length_m.max(f64::EPSILON));
+    let gap_m = start_m - at(0.0).0;
+    let join_m = (JOIN_SHARE * gap_m.length()).max(JOIN_M);
     let steps = (length_m / FINE_M).ceil().max(1.0);
     for step in 0..=steps as usize {
         let driven_m = length_m * step as f64 / steps;

@@ -49,16 +49,19 @@ pub fn parse<'text>(path: &Path, text: &'text str) -> Result<Document<'text>> {
             }
             _ => error.pos().row,
         };
-        let element = last_opened(text, line).unwrap_or("file");
+        let element = last_tag(text, line).unwrap_or("file");
         fault(path, line, element, format!("no well-formed XML: {error}"), Some(hint))
     })
 }
 
-/// The last element that is opened up to a line.
-fn last_opened(text: &str, line: u32) -> Option<&str> {
+/// The last element that is opened or closed up to a line.
+fn last_tag(text: &str, line: u32) -> Option<&str> {
     let end = text.split_inclusive('\n').take(line as usize).map(str::len).sum();
     let tags = text[..end].rsplit('<');
-    let names = tags.map(|tag| tag.split(|c: char| c.is_whitespace() || "/>".contains(c)).next());
+    let names = tags.map(|tag| {
+        let tag = tag.trim_start_matches('/');
+        tag.split(|c: char| c.is_whitespace() || "/>".contains(c)).next()
+    });
     names.flatten().find(|name| name.starts_with(char::is_alphabetic))
 }
 

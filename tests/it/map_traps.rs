@@ -169,6 +169,11 @@ fn lane_changes_are_smooth_and_cost_what_was_asked() {
     // 3.5 m over 40 m, 1.875 times as steep in the middle.
     let steepest = y_m.windows(2).map(|y| (y[1] - y[0]).abs()).fold(0.0, f64::max);
     assert!((0.06..0.07).contains(&steepest), "{steepest}");
+    // With no room to change, the way reaches the other lane as it goes on.
+    let short = [LanePlace { lane: 0, s_m: 100.0 }, LanePlace { lane: 1, s_m: 106.0 }];
+    let route = MapRoute::through(&planner, &short).unwrap();
+    let steps = route.points.windows(2).map(|p| (p[1].position_m.y - p[0].position_m.y).abs());
+    assert!(steps.fold(0.0, f64::max) < 0.06);
     let behind = LanePlace { lane: 0, s_m: 5.0 };
     assert_eq!(planner.between_places(places[0], behind), None, "no way round this block");
 }
@@ -183,7 +188,7 @@ fn files_that_are_no_maps_are_refused_with_element_and_line() {
         opendrive(&(road("1", 0.0, 50.0, &lanes).xml() + &road("1", 0.0, 5.0, &lanes).xml()));
     let cases = [
         (String::new(), "file", 1, "no well-formed XML"),
-        (good[..good.len() / 2].to_string(), "geometry", 6, "no well-formed XML"),
+        (good[..good.len() / 2].to_string(), "center", 7, "no well-formed XML"),
         (replaced("</planView>", "</plan>"), "plan", 6, "no well-formed XML"),
         (opendrive(""), "OpenDRIVE", 2, "without a <road>"),
         ("<net>\n</net>".into(), "net", 1, "should be <OpenDRIVE>"),
