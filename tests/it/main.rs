@@ -49,6 +49,8 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod encoding;
+mod towns;
+mod scenery;
 mod recording;
 #[cfg(feature = "learning")]
 mod stats;
