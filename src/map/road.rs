@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::map::{
-    opendrive::{Road, Section},
+    opendrive::{Crosswalk, Road, Section},
     profile::{Cubic, Profile},
 };
 
@@ -93,6 +93,15 @@ impl Road {
         let line = self.reference_line.at(s_m);
         let left = DVec2::from_angle(line.heading_rad).perp();
         (line.position_m + t_m * left).extend(self.elevation.at(s_m))
+    }
+
+    /// The outline of a crosswalk of this road, map frame, m.
+    pub fn crosswalk_m(&self, crosswalk: &Crosswalk) -> Vec<DVec2> {
+        let line = self.reference_line.at(crosswalk.s_m);
+        let axis = DVec2::from_angle(line.heading_rad + crosswalk.heading_rad);
+        let origin_m = self.place(crosswalk.s_m, crosswalk.t_m).truncate();
+        let corners = crosswalk.corners_m.iter().map(|corner| DVec2::from(*corner));
+        corners.map(|corner| origin_m + axis.rotate(corner)).collect()
     }
 
     /// A place's distance from the reference line at `s_m`, positive left, m.

@@ -194,11 +194,7 @@ fn dashes(from_m: f64, to_m: f64, broken: bool) -> Vec<(f64, f64)> {
 
 fn crosswalks(road: &Road, shapes: &mut Vec<Shape>) {
     for crosswalk in &road.crosswalks {
-        let line = road.reference_line.at(crosswalk.s_m);
-        let axis = DVec2::from_angle(line.heading_rad + crosswalk.heading_rad);
-        let origin_m = road.place(crosswalk.s_m, crosswalk.t_m).truncate();
-        let corners = crosswalk.corners_m.iter().map(|corner| DVec2::from(*corner));
-        let outline_m = corners.map(|corner| origin_m + axis.rotate(corner)).collect();
+        let outline_m = road.crosswalk_m(crosswalk);
         shapes.push(shape(road, crosswalk.s_m, Layer::Crossing, CROSSING, outline_m));
     }
 }

@@ -11,7 +11,7 @@ use crate::{
         junction::{Arm, Crossing, can_turn_right, trims_m},
         network::{Crosswalk, Junction, Network, Road, Tie},
         plan::{Plan, Street},
-        profile::{FurtherLanes, Profile, Section, Use},
+        profile::{FurtherLanes, Lane, Profile, Section, Use},
     },
 };
 
@@ -46,7 +46,6 @@ pub fn lay_out(plan: &Plan) -> Result<Network> {
     for (street, trims_m) in trims_m.iter().enumerate() {
         roads.push(layout.road(street, *trims_m, &crossings)?);
     }
-    let streets = roads.len();
     let mut junctions = Vec::new();
     for (junction, ends) in crossings.iter().enumerate() {
         let arms: Vec<Arm> = ends
@@ -60,7 +59,6 @@ pub fn lay_out(plan: &Plan) -> Result<Network> {
         roads.extend(crossing.roads);
         junctions.push(Junction { id: junction_id(junction), connections: crossing.connections });
     }
-    debug_assert!(roads[..streets].iter().all(|road| road.junction.is_none()));
     Ok(Network { name: plan.name, roads, junctions })
 }
 
@@ -234,7 +232,7 @@ fn crosswalks(profile: &Profile, sections: &[Section]) -> Vec<Crosswalk> {
     if !profile.has_crosswalks || length_m < CROSSWALK_ROAD_M {
         return Vec::new();
     }
-    let kerb = |lanes: &[crate::towns::profile::Lane]| {
+    let kerb = |lanes: &[Lane]| {
         let is_carriageway = |used_for: Use| !matches!(used_for, Use::Verge | Use::Sidewalk);
         lanes
             .iter()

@@ -11,6 +11,8 @@ pub mod movement;
 pub mod network;
 pub mod junction;
 pub mod layout;
+pub mod markings;
+pub mod xml_text;
 pub mod opendrive;
 pub mod cross_sections;
 pub mod town01;

@@ -1,23 +1,19 @@
 //! A network as OpenDRIVE 1.4, the version of CARLA's own maps.
 
-use std::fmt::Write as _;
-
 use glam::DVec2;
 
 use crate::{
     map::reference_line::{Piece, Shape},
     towns::{
+        markings::{self, Mark},
         network::{Crosswalk, Junction, Network, Road, Tie},
-        profile::{Lane, Section, Use},
+        profile::{Section, Use},
+        xml_text::{Xml, number},
     },
 };
 
 /// Extent of a crosswalk along the road, m.
 const CROSSWALK_M: f64 = 3.0;
-
-/// Lanes are kept for this long before a junction, m, on roads at least so long.
-const KEEP_LANE_M: f64 = 15.0;
-const KEEP_LANE_ROAD_M: f64 = 60.0;
 
 /// The text of a network. The same network gives the same bytes.
 pub fn text(network: &Network) -> String {
@@ -30,7 +26,7 @@ pub fn text(network: &Network) -> String {
             ("revMajor", "1"),
             ("revMinor", "4"),
             ("name", network.name),
-            ("version", env!("CARGO_PKG_VERSION")),
+            ("version", "1.00"),
             ("north", &number(north)),
             ("south", &number(south)),
             ("east", &number(east)),
@@ -44,56 +40,6 @@ pub fn text(network: &Network) -> String {
     network.junctions.iter().for_each(|junction| add_junction(&mut xml, junction));
     xml.close("OpenDRIVE");
     xml.text
-}
-
-/// Indented elements, one a line.
-struct Xml {
-    text: String,
-    depth: usize,
-}
-
-impl Default for Xml {
-    fn default() -> Self {
-        Xml { text: "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_string(), depth: 0 }
-    }
-}
-
-impl Xml {
-    fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
-        self.tag(name, attributes, ">");
-        self.depth += 1;
-    }
-
-    fn empty(&mut self, name: &str, attributes: &[(&str, &str)]) {
-        self.tag(name, attributes, "/>");
-    }
-
-    fn close(&mut self, name: &str) {
-        self.depth -= 1;
-        self.line(&format!("</{name}>"));
-    }
-
-    fn tag(&mut self, name: &str, attributes: &[(&str, &str)], end: &str) {
-        let mut line = format!("<{name}");
-        for (key, value) in attributes {
-            line.push_str(&format!(" {key}=\"{value}\""));
-        }
-        line.push_str(end);
-        self.line(&line);
-    }
-
-    fn line(&mut self, line: &str) {
-        let indent = 2 * self.depth;
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.text, "{:indent$}{line}", "");
-    }
-}
-
-/// Micrometres and less are noise; without it, texts of other platforms are the same in practice.
-fn number(value: f64) -> String {
-    let text = format!("{value:.10}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_string() } else { text.to_string() }
 }
 
 fn add_road(xml: &mut Xml, road: &Road) {
@@ -115,14 +61,10 @@ fn add_road(xml: &mut Xml, road: &Road) {
     road.course.pieces().iter().for_each(|piece| add_piece(xml, piece));
     xml.close("planView");
     xml.open("elevationProfile", &[]);
-    xml.empty(
-        "elevation",
-        &polynomial("s", 0.0, [0.0; 4]).each_ref().map(|(k, v)| (*k, v.as_str())),
-    );
+    add_polynomial(xml, "elevation", "s", [0.0; 4]);
     xml.close("elevationProfile");
     xml.open("lanes", &[]);
-    let offset = polynomial("s", 0.0, [road.shift_m, 0.0, 0.0, 0.0]);
-    xml.empty("laneOffset", &offset.each_ref().map(|(k, v)| (*k, v.as_str())));
+    add_polynomial(xml, "laneOffset", "s", [road.shift_m, 0.0, 0.0, 0.0]);
     for (i, section) in road.sections.iter().enumerate() {
         add_section(xml, road, i, section);
     }
@@ -179,54 +121,36 @@ fn add_cubics(xml: &mut Xml, name: &str, keys: &[&str], values: &[f64], more: &[
     xml.empty(name, &attributes);
 }
 
-fn polynomial(
-    key: &'static str,
-    start_m: f64,
-    [a, b, c, d]: [f64; 4],
-) -> [(&'static str, String); 5] {
-    [(key, start_m), ("a", a), ("b", b), ("c", c), ("d", d)]
-        .map(|(key, value)| (key, number(value)))
+/// A polynomial of the distance from its start, which is the road's or the section's.
+fn add_polynomial(xml: &mut Xml, name: &str, start: &str, coefficients: [f64; 4]) {
+    let [a, b, c, d] = coefficients.map(number);
+    xml.empty(name, &[(start, "0"), ("a", &a), ("b", &b), ("c", &c), ("d", &d)]);
 }
 
 fn add_section(xml: &mut Xml, road: &Road, index: usize, section: &Section) {
     xml.open("laneSection", &[("s", &number(section.s_m))]);
-    let ends = Ends {
-        // Nobody changes lanes shortly before a junction.
-        keeps_start: index == 0 && road.junction.is_none(),
-        keeps_end: index + 1 == road.sections.len() && road.junction.is_none(),
-        in_junction: road.junction.is_some(),
-    };
     if !section.left.is_empty() {
         xml.open("left", &[]);
-        for (i, lane) in section.left.iter().enumerate().rev() {
-            add_lane(xml, i as i32 + 1, lane, section, &section.left[i + 1..], ends);
-        }
+        (0..section.left.len()).rev().for_each(|place| add_lane(xml, road, index, true, place));
         xml.close("left");
     }
     xml.open("center", &[]);
     xml.open("lane", &[("id", "0"), ("type", "none"), ("level", "false")]);
-    add_mark(xml, 0.0, centre_mark(section, ends));
+    add_mark(xml, &markings::centre(road, section));
     xml.close("lane");
     xml.close("center");
     if !section.right.is_empty() {
         xml.open("right", &[]);
-        for (i, lane) in section.right.iter().enumerate() {
-            add_lane(xml, -(i as i32 + 1), lane, section, &section.right[i + 1..], ends);
-        }
+        (0..section.right.len()).for_each(|place| add_lane(xml, road, index, false, place));
         xml.close("right");
     }
     xml.close("laneSection");
 }
 
-/// What the ends of a section are.
-#[derive(Clone, Copy)]
-struct Ends {
-    keeps_start: bool,
-    keeps_end: bool,
-    in_junction: bool,
-}
-
-fn add_lane(xml: &mut Xml, id: i32, lane: &Lane, section: &Section, outside: &[Lane], ends: Ends) {
+fn add_lane(xml: &mut Xml, road: &Road, index: usize, is_left: bool, place: usize) {
+    let section = &road.sections[index];
+    let lane = if is_left { &section.left[place] } else { &section.right[place] };
+    let id = (place as i32 + 1) * if is_left { 1 } else { -1 };
     let kind = match lane.used_for {
         Use::Median => "median",
         Use::Driving => "driving",
@@ -234,8 +158,7 @@ fn add_lane(xml: &mut Xml, id: i32, lane: &Lane, section: &Section, outside: &[L
         Use::Verge => "border",
         Use::Sidewalk => "sidewalk",
     };
-    let id = id.to_string();
-    xml.open("lane", &[("id", &id), ("type", kind), ("level", "false")]);
+    xml.open("lane", &[("id", &id.to_string()), ("type", kind), ("level", "false")]);
     if lane.predecessor.is_some() || lane.successor.is_some() {
         xml.open("link", &[]);
         for (which, linked) in [("predecessor", lane.predecessor), ("successor", lane.successor)] {
@@ -252,65 +175,24 @@ fn add_lane(xml: &mut Xml, id: i32, lane: &Lane, section: &Section, outside: &[L
         3.0 * grown_m / section.length_m.powi(2),
         -2.0 * grown_m / section.length_m.powi(3),
     ];
-    let width = polynomial("sOffset", 0.0, cubic);
-    xml.empty("width", &width.each_ref().map(|(key, value)| (*key, value.as_str())));
-    let beside = outside.first().map(|lane| lane.used_for);
-    let is_dashed = (lane.used_for, beside) == (Use::Driving, Some(Use::Driving));
-    if is_dashed && section.length_m > KEEP_LANE_ROAD_M {
-        let is_left = !id.starts_with('-');
-        let (kept_first, kept_last) = (is_left && ends.keeps_start, !is_left && ends.keeps_end);
-        add_mark(xml, 0.0, if kept_first { KEEP } else { DASHED });
-        if kept_first {
-            add_mark(xml, KEEP_LANE_M, DASHED);
-        }
-        if kept_last {
-            add_mark(xml, section.length_m - KEEP_LANE_M, KEEP);
-        }
-    } else {
-        add_mark(xml, 0.0, outer_mark(lane.used_for, beside, ends));
-    }
+    add_polynomial(xml, "width", "sOffset", cubic);
+    markings::outer(road, index, is_left, place).iter().for_each(|mark| add_mark(xml, mark));
     xml.close("lane");
 }
 
-/// A road mark: type, colour, whether lanes may be changed over it.
-type Mark = (&'static str, &'static str, &'static str);
-
-const DASHED: Mark = ("broken", "white", "both");
-const KEEP: Mark = ("solid", "white", "none");
-const KERB: Mark = ("curb", "white", "none");
-const NONE: Mark = ("none", "white", "none");
-
-fn outer_mark(used_for: Use, beside: Option<Use>, ends: Ends) -> Mark {
-    match (used_for, beside) {
-        (Use::Shoulder, Some(Use::Verge | Use::Sidewalk)) => KERB,
-        _ if ends.in_junction => NONE,
-        (Use::Driving, Some(Use::Driving)) => DASHED,
-        (Use::Driving, _) => KEEP,
-        (Use::Median, _) => ("solid", "yellow", "none"),
-        _ => NONE,
-    }
-}
-
-fn centre_mark(section: &Section, ends: Ends) -> Mark {
-    let driving =
-        |lanes: &[Lane]| lanes.iter().filter(|lane| lane.used_for == Use::Driving).count();
-    let has_median = |lane: &Lane| lane.used_for == Use::Median;
-    match (driving(&section.left), driving(&section.right)) {
-        _ if ends.in_junction || section.right.iter().any(has_median) => NONE,
-        (0, _) => ("solid", "yellow", "none"),
-        (1, 1) => ("broken", "yellow", "none"),
-        _ => ("solid solid", "yellow", "none"),
-    }
-}
-
-fn add_mark(xml: &mut Xml, start_m: f64, (kind, colour, change): Mark) {
-    let mut attributes = vec![("type", kind), ("material", "standard"), ("color", colour)];
+fn add_mark(xml: &mut Xml, mark: &Mark) {
+    let Mark { start_m, kind, colour, change } = *mark;
+    let start = number(start_m);
+    let mut attributes = vec![
+        ("sOffset", start.as_str()),
+        ("type", kind),
+        ("material", "standard"),
+        ("color", colour),
+    ];
     if kind != "none" {
-        attributes.extend([("width", "0.125")]);
+        attributes.push(("width", "0.125"));
     }
     attributes.push(("laneChange", change));
-    let start = number(start_m);
-    attributes.insert(0, ("sOffset", &start));
     xml.empty("roadMark", &attributes);
 }
 

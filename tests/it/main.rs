@@ -52,6 +52,8 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod encoding;
+mod towns;
+mod scenery;
 mod recording;
 mod map_fixtures;
 mod map_geometry;

@@ -64,6 +64,11 @@ impl Ground {
         for road in &map.opendrive().roads {
             let before = surfaces.len();
             (0..road.sections.len()).for_each(|section| add_section(road, section, &mut surfaces));
+            // Across medians and verges as well.
+            surfaces.extend(road.crosswalks.iter().map(|crosswalk| Surface {
+                taken: Taken::Walked,
+                outline_m: hull_m(road.crosswalk_m(crosswalk)),
+            }));
             if let Some(junction) = &road.junction {
                 let corners = surfaces[before..].iter().flat_map(|surface| &surface.outline_m);
                 junctions.entry(junction).or_default().extend(corners);
