@@ -39,8 +39,16 @@ const MAX_COORDINATE_M: f64 = 1e8;
 /// [`crate::error::Error::Io`] if the file cannot be read, [`crate::error::Error::Map`] with
 /// element and line if it is no XML or no OpenDRIVE, or exceeds a limit.
 pub fn read(path: &Path) -> Result<OpenDrive> {
-    let text = xml::read_text(path)?;
-    let document = xml::parse(path, &text)?;
+    parse(path, &xml::read_text(path)?)
+}
+
+/// Read a map's text; `path` is what errors call it.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn parse(path: &Path, text: &str) -> Result<OpenDrive> {
+    let document = xml::parse(path, text)?;
     let root = Element::root(&document, path, "OpenDRIVE")?;
     let (mut roads, mut ids, mut total_m) = (Vec::new(), HashSet::new(), 0.0);
     for element in root.children("road") {

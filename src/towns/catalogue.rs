@@ -24,6 +24,16 @@ pub fn plans() -> Vec<Plan> {
     ]
 }
 
+/// A town as OpenDRIVE.
+///
+/// # Errors
+///
+/// [`Error::Map`] if the plan cannot be laid out.
+pub fn text(plan: &Plan) -> Result<String> {
+    let network: Network = lay_out(plan)?;
+    Ok(opendrive::text(&network))
+}
+
 /// Write every town as `NAME.xodr` into a directory, which is made if it is missing. A file that
 /// is there with the same bytes stays.
 ///
@@ -34,9 +44,8 @@ pub fn plans() -> Vec<Plan> {
 pub fn write_all(out: &Path) -> Result<Vec<PathBuf>> {
     let mut towns = Vec::new();
     for plan in plans() {
-        let network: Network = lay_out(&plan)?;
-        let path = out.join(format!("{}.xodr", network.name));
-        let text = opendrive::text(&network);
+        let path = out.join(format!("{}.xodr", plan.name));
+        let text = text(&plan)?;
         let is_there = match std::fs::read(&path) {
             Ok(bytes) if bytes == text.as_bytes() => true,
             Ok(_) => {

@@ -1,24 +1,20 @@
 //! Many drives of the expert, to know that the world can be driven in: who arrives, and why not.
 
-use std::{ops::Range, sync::Arc};
+use std::{collections::BTreeMap, fmt, ops::Range, sync::Arc};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    map::{planner::Planner, road_map::RoadMap, route::MapRoute},
+    map::{planner::Planner, route::MapRoute},
     noise::{Noise, Purpose},
-    towns::scenery::{collection::Scenery, things::Thing},
     world::{
         density::{Counts, Density},
         ego::{Car, SEDAN},
-        episode::{Outcome, drive},
+        episode::{End, Outcome, drive},
         expert::{Expert, ExpertConfig},
-        footprint::Footprint,
-        obstacles::Obstacles,
-        paving::pave,
         route::Route,
-        streets::Streets,
+        town::Town,
         walkers::Crossings,
         world::{Start, World},
     },
@@ -29,30 +25,6 @@ pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
 
 /// What a lane change costs the planner, m.
 const LANE_CHANGE_M: f64 = 30.0;
-
-/// A town, ready to be driven in.
-#[derive(Clone, Debug)]
-pub struct Town {
-    pub name: String,
-    pub map: Arc<RoadMap>,
-    pub streets: Arc<Streets>,
-    pub obstacles: Arc<Obstacles>,
-}
-
-impl Town {
-    /// A town with scenery by seed.
-    pub fn new(name: String, map: RoadMap, seed: u64) -> Town {
-        let streets = Arc::new(pave(&map));
-        let scenery = Scenery::derive(&map, seed);
-        let standing = scenery.things().iter().filter(|thing| thing.kind.is_obstacle());
-        let footprint = |thing: &Thing| {
-            let Thing { footprint, .. } = thing;
-            Footprint::new(footprint.centre_m, footprint.heading_rad, footprint.half_m)
-        };
-        let obstacles = Arc::new(Obstacles::new(standing.map(footprint).collect()));
-        Town { name, map: Arc::new(map), streets, obstacles }
-    }
-}
 
 /// Which drives.
 #[derive(Clone, Debug)]
@@ -75,8 +47,8 @@ pub struct Drive {
     pub counts: Counts,
     #[serde(flatten)]
     pub outcome: Outcome,
-    /// Decisions to brake harder than for comfort.
-    pub emergency_steps: u64,
+    /// How often it began to brake harder than for comfort.
+    pub emergencies: u64,
     pub crossings: Crossings,
     /// Hash of the last state.
     pub hash: u64,
@@ -117,11 +89,12 @@ fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Dri
         episode: stream,
     });
     let mut expert = Expert::new(drill.expert, drill.seed, stream);
-    let mut emergency_steps = 0;
+    let (mut emergencies, mut was_emergency) = (0, false);
     let counts = world.counts();
     let outcome = drive(&mut world, &mut |world| {
         let decision = expert.decide(world);
-        emergency_steps += u64::from(decision.is_emergency);
+        emergencies += u64::from(decision.is_emergency && !was_emergency);
+        was_emergency = decision.is_emergency;
         decision.applied
     });
     Some(Drive {
@@ -131,7 +104,7 @@ fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Dri
         seed: drill.seed,
         counts,
         outcome,
-        emergency_steps,
+        emergencies,
         crossings: world.walkers.crossings,
         hash: world.snapshot().hash(),
     })
@@ -140,4 +113,76 @@ fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Dri
 /// A car at rest on the first waypoint.
 fn at_start(route: &Route) -> Car {
     Car::at_rest(SEDAN, route.waypoints()[0].position_m, route.forward(0.0).to_angle())
+}
+
+/// All drives, for people and for programs.
+#[derive(Clone, Debug)]
+pub struct Report {
+    drives: Vec<Drive>,
+}
+
+impl Report {
+    pub fn new(drives: Vec<Drive>) -> Report {
+        Report { drives }
+    }
+
+    /// One JSON object a line and drive.
+    pub fn json_lines(&self) -> String {
+        let line = |drive: &Drive| serde_json::to_string(drive).unwrap_or_default() + "\n";
+        self.drives.iter().map(line).collect()
+    }
+
+    /// By town and level, in order.
+    fn tasks(&self) -> BTreeMap<(&str, Density), Vec<&Drive>> {
+        let mut tasks: BTreeMap<(&str, Density), Vec<&Drive>> = BTreeMap::new();
+        for drive in &self.drives {
+            tasks.entry((&drive.town, drive.traffic)).or_default().push(drive);
+        }
+        tasks
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for drive in self.drives.iter().filter(|drive| drive.outcome.end != End::Goal) {
+            let Drive { town, traffic, episode, outcome, .. } = drive;
+            let (at_m, route_m) = (outcome.progress_m, outcome.route_m);
+            let end = match &outcome.end {
+                End::Contact(contact) => format!(
+                    "{:?} touched at {:.1} m/s, {:?} at fault",
+                    contact.other, contact.relative_speed_mps, contact.fault
+                ),
+                other => format!("{other:?}"),
+            };
+            let traffic = traffic.name();
+            writeln!(f, "{town} {traffic} {episode}: {end}, {at_m:.0} of {route_m:.0} m")?;
+        }
+        let header = ["town", "traffic", "arrived", "km", "km/h", "wrong lane %", "overspeed %"];
+        let more = ["standing %", "emergency braking /km", "jaywalkers"];
+        let header: Vec<&str> = header.into_iter().chain(more).collect();
+        writeln!(f, "| {} |\n|{}", header.join(" | "), "---|".repeat(header.len()))?;
+        let all = (("all", ""), self.drives.iter().collect());
+        let tasks = self.tasks().into_iter();
+        let tasks = tasks.map(|((town, density), drives)| ((town, density.name()), drives));
+        for ((town, traffic), drives) in tasks.chain(std::iter::once(all)) {
+            let drives: Vec<&Drive> = drives;
+            let sum = |value: &dyn Fn(&Drive) -> f64| drives.iter().map(|d| value(d)).sum::<f64>();
+            let driven_s = sum(&|d| d.outcome.sums.driven_s).max(f64::MIN_POSITIVE);
+            let km = sum(&|d| d.outcome.sums.driven_m) / 1e3;
+            let share = |seconds: f64| 100.0 * seconds / driven_s;
+            let arrived = drives.iter().filter(|d| d.outcome.end == End::Goal).count();
+            writeln!(
+                f,
+                "| {town} | {traffic} | {arrived}/{} | {km:.1} | {:.1} | {:.2} | {:.2} | {:.1} | {:.2} | {} |",
+                drives.len(),
+                km / driven_s * 3600.0,
+                share(sum(&|d| d.outcome.sums.wrong_lane_s)),
+                share(sum(&|d| d.outcome.sums.overspeed_s)),
+                share(sum(&|d| d.outcome.sums.standing_s)),
+                sum(&|d| d.emergencies as f64) / km.max(f64::MIN_POSITIVE),
+                drives.iter().map(|d| d.crossings.without_notice).sum::<u64>(),
+            )?;
+        }
+        Ok(())
+    }
 }

@@ -30,4 +30,5 @@ pub mod world;
 pub mod expert;
 pub mod scoring;
 pub mod episode;
+pub mod town;
 pub mod drill;

@@ -1,0 +1,94 @@
+//! Towns to drive in: the package's own, or OpenDRIVE files in their place.
+
+use std::{fs, path::Path, sync::Arc};
+
+use crate::{
+    atomic::file_name,
+    error::{Error, Result},
+    map::{reader, road_map::RoadMap},
+    towns::{
+        catalogue,
+        scenery::{collection::Scenery, things::Thing},
+    },
+    world::{footprint::Footprint, obstacles::Obstacles, paving::pave, streets::Streets},
+};
+
+/// Scenery is the same in all episodes of a town.
+const SCENERY_SEED: u64 = 0;
+
+/// A town, ready to be driven in.
+#[derive(Clone, Debug)]
+pub struct Town {
+    pub name: String,
+    pub map: Arc<RoadMap>,
+    pub streets: Arc<Streets>,
+    pub obstacles: Arc<Obstacles>,
+}
+
+impl Town {
+    /// A map with the scenery that it is given.
+    pub fn new(name: String, map: RoadMap) -> Town {
+        let streets = Arc::new(pave(&map));
+        let scenery = Scenery::derive(&map, SCENERY_SEED);
+        let standing = scenery.things().iter().filter(|thing| thing.kind.is_obstacle());
+        let footprint = |thing: &Thing| {
+            let Thing { footprint, .. } = thing;
+            Footprint::new(footprint.centre_m, footprint.heading_rad, footprint.half_m)
+        };
+        let obstacles = Arc::new(Obstacles::new(standing.map(footprint).collect()));
+        Town { name, map: Arc::new(map), streets, obstacles }
+    }
+
+    /// Towns by name, all if none is named: the files `NAME.xodr` of a folder, or the package's own.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] if there is no town of a name, with those that there are; if a map cannot
+    /// be read, as [`RoadMap::read`].
+    pub fn choose(maps: Option<&Path>, names: &[String]) -> Result<Vec<Town>> {
+        let known = match maps {
+            None => catalogue::plans().iter().map(|plan| plan.name.to_string()).collect(),
+            Some(folder) => names_in(folder)?,
+        };
+        if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
+            return Err(Error::Config {
+                key: "--town".into(),
+                what: format!("there is no town `{unknown}`"),
+                hint: Some(format!("there are {}", known.join(", "))),
+            });
+        }
+        let chosen = known.iter().filter(|name| names.is_empty() || names.contains(name));
+        chosen.map(|name| Town::open(maps, name)).collect()
+    }
+
+    fn open(maps: Option<&Path>, name: &str) -> Result<Town> {
+        let map = match maps {
+            Some(folder) => RoadMap::read(&folder.join(format!("{name}.xodr")))?,
+            None => {
+                let plans = catalogue::plans();
+                let plan = plans.iter().find(|plan| plan.name == name);
+                let text = plan.map(catalogue::text).transpose()?.unwrap_or_default();
+                RoadMap::new(reader::parse(name.as_ref(), &text)?)
+            }
+        };
+        Ok(Town::new(name.to_string(), map))
+    }
+}
+
+/// Names of the maps in a folder, in order.
+fn names_in(folder: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io("read", folder))? {
+        let path = entry.map_err(Error::io("read", folder))?.path();
+        names.extend(file_name(&path).strip_suffix(".xodr").map(str::to_string));
+    }
+    names.sort();
+    if names.is_empty() {
+        return Err(Error::Config {
+            key: "--maps".into(),
+            what: format!("no .xodr file in {}", folder.display()),
+            hint: Some("`pmp-sim towns --out DIR` writes seven".into()),
+        });
+    }
+    Ok(names)
+}
