@@ -163,9 +163,10 @@ impl<'a, 'text> Element<'a, 'text> {
     }
 
     fn parsed<T: FromStr>(self, name: &str, text: &str, kind: &str) -> Result<T> {
-        text.trim()
-            .parse()
-            .or_else(|_| Err(self.fault(format!("attribute `{name}` is `{text}`, not {kind}"))))
+        let Ok(value) = text.trim().parse() else {
+            return Err(self.fault(format!("attribute `{name}` is `{text}`, not {kind}")));
+        };
+        Ok(value)
     }
 
     /// Line of the element, from 1.
