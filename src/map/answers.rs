@@ -1,13 +1,14 @@
 //! What `pmp-sim map` answers, as JSON and as text.
 
-use std::{fmt, fs, path::Path};
+use std::{fmt, path::Path};
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    atomic,
     error::{Error, Result},
-    map::{planner::Planner, road_map::RoadMap, xml::MAX_BYTES},
+    map::{graph::waypoints_m, links::LaneKey, planner::Planner, road_map::RoadMap},
 };
 
 /// A map in figures, and answers to what was asked of it.
@@ -15,7 +16,7 @@ use crate::{
 pub struct MapAnswers {
     pub roads: usize,
     pub junctions: usize,
-    /// Lanes of the lane graph.
+    /// Driving lanes of the file that have a whole half metre of `s`, as CARLA counts.
     pub driving_lanes: usize,
     /// Sum over the driving lanes, each from its first to its last half metre, as CARLA counts.
     pub driving_lane_length_m: f64,
@@ -109,11 +110,14 @@ impl MapAnswers {
     /// The figures of a map.
     pub fn new(map: &RoadMap) -> Self {
         let lanes = map.graph().lanes();
+        let roads = &map.opendrive().roads;
+        let has_waypoint =
+            |key: &LaneKey| waypoints_m(&roads[key.road], key.section).next().is_some();
         let in_junctions = lanes.iter().filter(|lane| lane.in_junction);
         MapAnswers {
-            roads: map.opendrive().roads.len(),
+            roads: roads.len(),
             junctions: map.opendrive().junctions.len(),
-            driving_lanes: lanes.len(),
+            driving_lanes: map.graph().keys().filter(has_waypoint).count(),
             driving_lane_length_m: lanes.iter().map(|lane| lane.waypoint_length_m).sum(),
             driving_lane_length_in_junctions_m: in_junctions
                 .map(|lane| lane.waypoint_length_m)
@@ -160,7 +164,7 @@ impl MapAnswers {
     ///
     /// [`Error::Io`] or [`Error::Json`] if the file cannot be read.
     pub fn with_points(mut self, map: &RoadMap, path: &Path) -> Result<Self> {
-        let places: Vec<[f64; 2]> = read_json(path)?;
+        let places: Vec<[f64; 2]> = atomic::read_json(path)?;
         self.points = Some(places.iter().map(|place| point(map, DVec2::from(*place))).collect());
         Ok(self)
     }
@@ -172,21 +176,11 @@ impl MapAnswers {
     /// [`Error::Io`] or [`Error::Json`] if the file cannot be read, [`Error::Config`] if a
     /// question names a lane that the map does not have.
     pub fn with_routes(mut self, map: &RoadMap, path: &Path) -> Result<Self> {
-        let questions: Vec<RouteQuestion> = read_json(path)?;
+        let questions: Vec<RouteQuestion> = atomic::read_json(path)?;
         let routes = questions.iter().enumerate().map(|(i, question)| route(map, i, question));
         self.routes = Some(routes.collect::<Result<_>>()?);
         Ok(self)
     }
-}
-
-fn read_json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T> {
-    let bytes = fs::metadata(path).map_err(Error::io("read", path))?.len();
-    if bytes > MAX_BYTES {
-        let what = format!("{} has {bytes} bytes, at most {MAX_BYTES} are read", path.display());
-        return Err(Error::Config { key: "questions".into(), what, hint: None });
-    }
-    let text = fs::read(path).map_err(Error::io("read", path))?;
-    serde_json::from_slice(&text).map_err(Error::json(path))
 }
 
 fn point(map: &RoadMap, place_m: DVec2) -> Option<PointAnswer> {

@@ -49,7 +49,7 @@ pub struct GraphLane {
     /// The lane beside, as seen by the driver, if it has the same direction.
     pub left: Option<LaneId>,
     pub right: Option<LaneId>,
-    /// The road marks allow to change into the lane beside.
+    /// The road mark half-way along the lane allows to change into the lane beside.
     pub may_change_left: bool,
     pub may_change_right: bool,
     /// Index of the junction in the map, if the road leads through one that the map has.
@@ -140,6 +140,11 @@ impl LaneGraph {
     /// section was contracted; empty if it is no driving lane.
     pub fn find(&self, key: LaneKey) -> &[LaneId] {
         self.by_key.get(&key).map_or(&[], Vec::as_slice)
+    }
+
+    /// Driving lanes of the file, contracted or not.
+    pub fn keys(&self) -> impl Iterator<Item = LaneKey> + '_ {
+        self.by_key.keys().copied()
     }
 
     /// Driving lanes of the file that were contracted.
@@ -234,18 +239,21 @@ fn arc_length_m(road: &Road, section: usize, index: usize) -> f64 {
 }
 
 fn waypoint_length_m(road: &Road, section: usize, index: usize) -> f64 {
-    let (from_m, to_m) = road.section_range_m(section);
-    let is_last = section + 1 == road.sections.len();
     let (mut length_m, mut last): (f64, Option<DVec3>) = (0.0, None);
-    let mut waypoint = (from_m / WAYPOINT_M).ceil();
-    // Half metres on a border belong to the section that begins there.
-    while waypoint * WAYPOINT_M < to_m || (is_last && waypoint * WAYPOINT_M == to_m) {
-        let position_m = road.centre(section, index, waypoint * WAYPOINT_M).position_m;
+    for s_m in waypoints_m(road, section) {
+        let position_m = road.centre(section, index, s_m).position_m;
         length_m += last.map_or(0.0, |last| position_m.distance(last));
         last = Some(position_m);
-        waypoint += 1.0;
     }
     length_m
+}
+
+/// Whole half metres of `s` in a section; one on a border belongs to the section beyond it.
+pub fn waypoints_m(road: &Road, section: usize) -> impl Iterator<Item = f64> {
+    let (from_m, to_m) = road.section_range_m(section);
+    let first = (from_m / WAYPOINT_M).ceil();
+    let count = (to_m / WAYPOINT_M).ceil() - first;
+    (0..count.max(0.0) as u64).map(move |waypoint| (first + waypoint as f64) * WAYPOINT_M)
 }
 
 /// Fill in the lanes beside and whether they may be changed into.
@@ -266,10 +274,10 @@ fn beside(road: &Road, lane: &mut GraphLane, by_key: &BTreeMap<LaneKey, Vec<Lane
         let higher = id > lane.key.lane;
         // The border between two lanes is the outer one of the inner lane.
         let inner = if id.abs() < lane.key.lane.abs() { id } else { lane.key.lane };
-        let marks = section.marks(inner).iter();
-        let may_change = marks
-            .filter(|mark| lane.from_m + mark.start_m < lane.to_m)
-            .any(|mark| mark.change.allows(higher));
+        // A route lays a change around the middle of the lane, so the mark there decides.
+        let middle_m = 0.5 * (lane.to_m - lane.from_m);
+        let mark = section.marks(inner).iter().rfind(|mark| mark.start_m <= middle_m);
+        let may_change = mark.is_some_and(|mark| mark.change.allows(higher));
         if higher == lane.along_s {
             (lane.left, lane.may_change_left) = (Some(other), may_change);
         } else {

@@ -22,6 +22,8 @@ pub mod graph;
 pub mod index;
 pub mod road_map;
 pub mod planner;
+pub mod route;
+pub mod leaderboard;
 pub mod canvas;
 pub mod shapes;
 pub mod picture;

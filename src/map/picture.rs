@@ -1,11 +1,11 @@
 //! A map as a picture file, north up: SVG or PNG by the ending of its name.
 
-use std::{fmt::Write as _, io::Write as _, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use glam::DVec2;
 
 use crate::{
-    atomic::AtomicFile,
+    atomic,
     error::{Error, Result},
     map::{
         canvas::Canvas,
@@ -45,9 +45,7 @@ pub fn draw(map: &RoadMap, beside: &[Shape], path: &Path) -> Result<()> {
             });
         }
     };
-    let mut file = AtomicFile::create(path)?;
-    file.write_all(&bytes).map_err(Error::io("write", path))?;
-    file.commit()?;
+    atomic::write(path, &bytes)?;
     Ok(())
 }
 
@@ -71,7 +69,7 @@ impl Frame {
     }
 
     /// A place from the north-west corner, x right and y down, m.
-    fn from_corner(&self, place_m: DVec2) -> DVec2 {
+    fn offset_m(&self, place_m: DVec2) -> DVec2 {
         DVec2::new(place_m.x - self.low_m.x, self.high_m.y - place_m.y)
     }
 }
@@ -86,7 +84,7 @@ fn svg(shapes: &[Shape], frame: &Frame) -> String {
     for Shape { outline_m, colour: [r, g, b], .. } in shapes {
         text.push_str("<path d=\"M");
         for point in outline_m {
-            let DVec2 { x, y } = frame.from_corner(*point);
+            let DVec2 { x, y } = frame.offset_m(*point);
             // Writing to a string cannot fail.
             let _ = write!(text, "{x:.2} {y:.2} ");
         }
@@ -103,7 +101,7 @@ fn png(shapes: &[Shape], frame: &Frame, path: &Path) -> Result<Vec<u8>> {
     let mut canvas = Canvas::new(width, height, BACKGROUND);
     for shape in shapes {
         let outline_px: Vec<DVec2> =
-            shape.outline_m.iter().map(|point| scale * frame.from_corner(*point)).collect();
+            shape.outline_m.iter().map(|point| scale * frame.offset_m(*point)).collect();
         canvas.fill(&outline_px, shape.colour);
     }
     let mut bytes = Vec::new();

@@ -42,18 +42,27 @@ pub fn parse<'text>(path: &Path, text: &'text str) -> Result<Document<'text>> {
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     Document::parse_with_options(text, options).map_err(|error| {
         let hint = "the file is cut off or damaged: export or copy it again".to_string();
-        let position = error.pos();
-        let element = last_opened(text, position.row).unwrap_or("file");
-        fault(path, position.row, element, format!("no well-formed XML: {error}"), Some(hint))
+        // A text that ends too early has no place of its own.
+        let line = match error {
+            roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode => {
+                text.lines().count().max(1) as u32
+            }
+            _ => error.pos().row,
+        };
+        let element = last_tag(text, line).unwrap_or("file");
+        fault(path, line, element, format!("no well-formed XML: {error}"), Some(hint))
     })
 }
 
-/// The last element that is opened up to a line.
-fn last_opened(text: &str, line: u32) -> Option<&str> {
+/// The last element that is opened or closed up to a line.
+fn last_tag(text: &str, line: u32) -> Option<&str> {
     let end = text.split_inclusive('\n').take(line as usize).map(str::len).sum();
     let tags = text[..end].rsplit('<');
-    tags.map(|tag| tag.split(|c: char| c.is_whitespace() || "/>".contains(c)).next().unwrap_or(""))
-        .find(|name| name.starts_with(char::is_alphabetic))
+    let names = tags.map(|tag| {
+        let tag = tag.trim_start_matches('/');
+        tag.split(|c: char| c.is_whitespace() || "/>".contains(c)).next()
+    });
+    names.flatten().find(|name| name.starts_with(char::is_alphabetic))
 }
 
 fn fault(path: &Path, line: u32, element: &str, what: String, hint: Option<String>) -> Error {
@@ -154,9 +163,15 @@ impl<'a, 'text> Element<'a, 'text> {
     }
 
     fn parsed<T: FromStr>(self, name: &str, text: &str, kind: &str) -> Result<T> {
-        text.trim()
-            .parse()
-            .or_else(|_| Err(self.fault(format!("attribute `{name}` is `{text}`, not {kind}"))))
+        let Ok(value) = text.trim().parse() else {
+            return Err(self.fault(format!("attribute `{name}` is `{text}`, not {kind}")));
+        };
+        Ok(value)
+    }
+
+    /// Line of the element, from 1.
+    pub fn line(self) -> u32 {
+        self.node.document().text_pos_at(self.node.range().start).row
     }
 
     /// An error about this element.
@@ -166,7 +181,6 @@ impl<'a, 'text> Element<'a, 'text> {
 
     /// The same with other advice.
     pub fn fault_with(self, what: String, hint: &str) -> Error {
-        let line = self.node.document().text_pos_at(self.node.range().start).row;
-        fault(self.path, line, self.name(), what, Some(hint.to_string()))
+        fault(self.path, self.line(), self.name(), what, Some(hint.to_string()))
     }
 }

@@ -52,6 +52,10 @@ mod encoding;
 mod towns;
 mod scenery;
 mod recording;
+mod map_fixtures;
+mod map_geometry;
+mod map_traps;
+mod maps;
 #[cfg(feature = "learning")]
 mod stats;
 #[cfg(feature = "learning")]
