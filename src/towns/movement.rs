@@ -1,5 +1,7 @@
 //! Which lane of a junction's arm leads into which lane of another.
 
+use std::ops::Range;
+
 /// Turns up to this count as going straight on, rad.
 const STRAIGHT_RAD: f64 = 0.79;
 
@@ -31,7 +33,7 @@ pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
         .min_by(|&a, &b| exits[a].turn_rad.abs().total_cmp(&exits[b].turn_rad.abs()))
         .filter(|&main| exits[main].turn_rad.abs() <= STRAIGHT_RAD);
     let mut found = Vec::new();
-    let mut add = |exit: usize, from_lanes: std::ops::Range<usize>, on_right: bool| {
+    let mut add = |exit: usize, from_lanes: Range<usize>, on_right: bool| {
         let width = exits[exit].lanes;
         for from_lane in from_lanes.clone() {
             let to_lane = match on_right {
@@ -49,8 +51,8 @@ pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
             _ => lanes.div_ceil(2),
         };
         let first_right = if lefts < exits.len() { shared.min(lanes - 1) } else { lanes };
-        (0..lefts).for_each(|exit| add(exit, 0..shared, false));
-        (lefts..exits.len()).for_each(|exit| add(exit, first_right..lanes, true));
+        add_turns(0..lefts, 0..shared, false, &mut add);
+        add_turns(lefts..exits.len(), first_right..lanes, true, &mut add);
         return found;
     };
     let (has_left, has_right) = (main > 0, main + 1 < exits.len());
@@ -62,8 +64,27 @@ pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
     };
     let left = if has_right { 0..1 } else { 0..spare.max(1) };
     let right = if has_right { lanes - spare.max(1)..lanes } else { 0..0 };
-    (0..main).for_each(|exit| add(exit, left.clone(), false));
+    add_turns(0..main, left, false, &mut add);
     add(main, straight, exits[main].turn_rad > JOINING_RAD);
-    (main + 1..exits.len()).for_each(|exit| add(exit, right.clone(), true));
+    add_turns(main + 1..exits.len(), right, true, &mut add);
     found
+}
+
+/// Turns to one side: all lanes serve the sharpest, and the one nearest to straight on serves the
+/// others too, so that no ways cross.
+fn add_turns(
+    exits: Range<usize>,
+    lanes: Range<usize>,
+    on_right: bool,
+    add: &mut impl FnMut(usize, Range<usize>, bool),
+) {
+    let sharpest = if on_right { exits.end.saturating_sub(1) } else { exits.start };
+    let gentle = if on_right {
+        lanes.start..lanes.start + 1
+    } else {
+        lanes.end.saturating_sub(1)..lanes.end
+    };
+    for exit in exits {
+        add(exit, if exit == sharpest { lanes.clone() } else { gentle.clone() }, on_right);
+    }
 }

@@ -49,10 +49,12 @@ impl Xml {
     }
 }
 
-/// A number with ten decimals, zeros at the end left out. What lies beyond is rounding, which may
-/// differ between platforms.
+/// What is smaller is rounding.
+const ZERO: f64 = 1e-12;
+
+/// A number with twelve digits that count: what lies beyond is rounding, which may differ between
+/// platforms.
 pub fn number(value: f64) -> String {
-    let text = format!("{value:.10}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_string() } else { text.to_string() }
+    let rounded = format!("{value:.11e}").parse().unwrap_or(value);
+    if rounded.abs() < ZERO { "0".to_string() } else { rounded.to_string() }
 }
