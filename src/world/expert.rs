@@ -181,7 +181,7 @@ impl Expert {
 
     /// The line of a junction that others have not let us into yet.
     fn line_ahead(&self, world: &World, front_m: f64) -> Option<Ahead> {
-        const LINE_M: f64 = 1.0;
+        const LINE_M: f64 = 2.0;
         let route = &world.route;
         let (from, to) = (route.index_at(front_m), route.index_at(front_m + HORIZON_M));
         let waypoints = &route.waypoints()[from..=to];

@@ -1,11 +1,15 @@
 //! The ego vehicle's way through the streets, as the world and the expert follow it.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
-    frame::{Command, ROUTE_SPACING_M},
-    map::route::MapRoute,
-    world::streets::{LaneId, Streets},
+    dataset::{ego::EgoState, route::Path},
+    frame::{self, Command, ROUTE_POINTS, ROUTE_SPACING_M},
+    map::route::{MapRoute, RoutePoint},
+    world::{
+        ego::Car,
+        streets::{LaneId, Streets},
+    },
 };
 
 /// A waypoint.
@@ -42,7 +46,7 @@ impl Route {
     pub fn new(route: &MapRoute, streets: &Streets) -> Option<Route> {
         let points = &route.points;
         let positions: Vec<DVec2> = points.iter().map(|p| p.position_m.truncate()).collect();
-        let waypoint = |(index, point): (usize, &crate::map::route::RoutePoint)| {
+        let waypoint = |(index, point): (usize, &RoutePoint)| {
             let lane = &streets.lanes[point.lane];
             Waypoint {
                 position_m: positions[index],
@@ -100,6 +104,20 @@ impl Route {
         let beyond = along.dot(position_m - self.waypoints[index].position_m);
         let at_m = index as f64 * ROUTE_SPACING_M + beyond.clamp(-ROUTE_SPACING_M, ROUTE_SPACING_M);
         at_m.clamp(0.0, self.length_m())
+    }
+
+    /// The local route of a car that has come `at_m` (paper, equation 1), by the code that ingest
+    /// uses for routes in logs.
+    pub fn local(&self, at_m: f64, car: &Car) -> Option<frame::Route> {
+        const SPAN_M: f64 = ROUTE_POINTS as f64 * ROUTE_SPACING_M;
+        let (from, to) = (self.index_at(at_m - BACK_M), self.index_at(at_m + BACK_M + SPAN_M));
+        let near = self.waypoints[from..=to].iter();
+        let points_m: Vec<DVec3> = near.map(|w| w.position_m.extend(w.height_m)).collect();
+        Path::planned(&points_m).ahead_on_route(&EgoState {
+            position_m: car.position_m.extend(self.at(at_m).height_m),
+            yaw_rad: car.yaw_rad,
+            velocity_mps: car.velocity_ego_mps().to_array(),
+        })
     }
 
     /// Distance of a place from the route at `at_m`, positive left, m.

@@ -51,6 +51,7 @@ mod training;
 mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
+mod world;
 mod encoding;
 mod towns;
 mod scenery;
