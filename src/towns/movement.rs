@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 /// Turns up to this count as going straight on, rad.
-const STRAIGHT_RAD: f64 = 0.79;
+const STRAIGHT_RAD: f64 = 1.05;
 
-/// Who comes in at such an angle joins from the side, rad.
+/// Who bends so far to the right has come from the right, and joins the outermost lane, rad.
 const JOINING_RAD: f64 = 0.14;
 
 /// An arm that may be left by.
@@ -65,7 +65,7 @@ pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
     let left = if has_right { 0..1 } else { 0..spare.max(1) };
     let right = if has_right { lanes - spare.max(1)..lanes } else { 0..0 };
     add_turns(0..main, left, false, &mut add);
-    add(main, straight, exits[main].turn_rad > JOINING_RAD);
+    add(main, straight, exits[main].turn_rad < -JOINING_RAD);
     add_turns(main + 1..exits.len(), right, true, &mut add);
     found
 }

@@ -403,8 +403,9 @@ fn lanes_keep_their_order_through_a_junction() {
     assert_eq!(ways(2, &cross), [(0, 0, 0), (1, 0, 0), (2, 1, 0)]);
     // The stem of a T: the left lane turns left.
     assert_eq!(ways(2, &[exit(90.0, 2), exit(-90.0, 2)]), [(0, 0, 0), (1, 1, 1)]);
-    // Who joins a motorway from the right joins its outermost lane.
-    assert_eq!(ways(1, &[exit(25.0, 3)]), [(0, 0, 2)]);
+    // Who joins a motorway from the right joins its outermost lane, from the left the innermost.
+    assert_eq!(ways(1, &[exit(-25.0, 3)]), [(0, 0, 2)]);
+    assert_eq!(ways(1, &[exit(25.0, 3)]), [(0, 0, 0)]);
     assert_eq!(ways(2, &[exit(0.0, 3)]), [(0, 0, 0), (0, 1, 1)]);
     // Where a lane ends, it leads into the last that goes on.
     assert_eq!(ways(2, &[exit(0.0, 1)]), [(0, 0, 0), (0, 1, 0)]);
