@@ -67,17 +67,27 @@ def psnr(a, b):
     return 10 * numpy.log10(255**2 / numpy.mean((picture(a) - picture(b)) ** 2))
 
 
-def compare_pictures(ours, theirs):
-    """PSNR of our stored pictures against the peer's where both took the same recorded one."""
-    columns = ["stamp", "image", "image_skew", "lidar_pixel"]
+def compare_frames(ours, theirs):
+    """PSNR of our stored pictures against the peer's, and the share of occupied lidar and radar
+    pixels that both have, where both took the same three recorded messages."""
+    columns = ["stamp", "image", "image_skew", "lidar_skew", "radar_skew", "lidar_pixel", "radar_pixel"]
     table = pyarrow.dataset.dataset(ours / "frames", partitioning="hive").to_table(columns=columns)
-    stamps = table["stamp"].cast("int64").to_numpy() + table["image_skew"].to_numpy()
-    pictures = dict(zip(stamps.tolist(), table["image"].to_pylist()))
-    peers = pyarrow.dataset.dataset(theirs).to_table(columns=["t_ns", "dt_cam", "image"])
-    times = peers["t_ns"].to_numpy() + peers["dt_cam"].to_numpy()
-    pairs = [(pictures[t], jpeg) for t, jpeg in zip(times.tolist(), peers["image"].to_pylist()) if t in pictures]
-    levels = [psnr(*pair) for pair in pairs[::10]]
-    return len(pairs), statistics.median(levels), min(levels)
+    frames = {}
+    for stamp, row in zip(table["stamp"].cast("int64").to_pylist(), table.drop_columns("stamp").to_pylist()):
+        skews = [row[f"{name}_skew"] for name in ("image", "lidar", "radar")]
+        if None not in skews:
+            frames[tuple(stamp + skew for skew in skews)] = row
+    columns = ["t_ns", "dt_cam", "dt_lidar", "dt_radar", "image", "rl_idx"]
+    levels, shares = [], []
+    for row in pyarrow.dataset.dataset(theirs).to_table(columns=columns).to_pylist():
+        own = frames.get(tuple(row["t_ns"] + row[name] for name in ("dt_cam", "dt_lidar", "dt_radar")))
+        if own is None:
+            continue
+        pixels, peers = set(own["lidar_pixel"]) | set(own["radar_pixel"]), set(row["rl_idx"])
+        shares.append(len(pixels & peers) / len(pixels | peers))
+        if len(shares) % 10 == 1:
+            levels.append(psnr(own["image"], row["image"]))
+    return len(shares), levels, shares
 
 
 def profile(binary, log, folder):
@@ -132,8 +142,12 @@ def main():
         frames = rows[0][0]
         print(f"| {name} | {rate[name]:.0f} | {rate[name] / best:.2f} | {frames / wall:.0f} | {megabytes / wall:.0f} | {memory:.0f} |")
     for index, name in enumerate(list(programs)[:2]):
-        pairs, median, least = compare_pictures(folder / f"out-{index}", folder / "out-3")
-        print(f"\n{name}: {pairs} frames took the picture that the peer took; PSNR between both, median {median:.1f} dB, least {least:.1f} dB")
+        same, levels, shares = compare_frames(folder / f"out-{index}", folder / "out-3")
+        print(
+            f"\n{name}: {same} frames took the messages that the peer took; PSNR between the pictures, median "
+            f"{statistics.median(levels):.1f} dB, least {min(levels):.1f} dB; occupied pixels that both have, median "
+            f"{100 * statistics.median(shares):.2f} %, least {100 * min(shares):.2f} %"
+        )
     shares = profile(binary("turbojpeg"), log, folder)
     if shares:
         print("\n| where the time goes (feature turbojpeg) | share |\n|---|---|")
