@@ -10,38 +10,31 @@ use crate::towns::{
 pub fn plan() -> Plan {
     let mut town = Plan::new("Town06");
     // Eastbound in the south, westbound in the north: the same turned by half a circle.
-    for side in [-1.0, 1.0] {
-        let place = |x_m: f64, y_m: f64| at(-side * x_m, -side * y_m);
-        let turn = |x_m: f64, y_m: f64, radius_m: f64| bend(-side * x_m, -side * y_m, radius_m);
-        let [entry, exit, far_entry, far_exit] =
-            [-520.0, -230.0, 230.0, 420.0].map(|x_m| place(x_m, -30.0));
+    for (name, side) in [("Expressway East", 1.0), ("Expressway West", -1.0)] {
+        let place = |x_m: f64, y_m: f64| at(side * x_m, side * y_m);
+        let turn = |x_m: f64, y_m: f64, radius_m: f64| bend(side * x_m, side * y_m, radius_m);
+        let on = |x_m: f64| place(x_m, -30.0);
+        let [entry, exit, far_entry, far_exit] = [-520.0, -230.0, 230.0, 420.0].map(on);
+        // Loops to turn back leave on the left; those of the other carriageway arrive there.
+        let [back, far_back] = [-150.0, 300.0].map(on);
+        let [from_far_back, from_back] = [-294.0, 156.0].map(on);
         town.street(
-            if side < 0.0 { "Expressway East" } else { "Expressway West" },
+            name,
             &EXPRESSWAY,
-            &[
-                place(-294.0, -30.0),
-                exit,
-                place(-150.0, -30.0),
-                place(0.0, -30.0),
-                place(156.0, -30.0),
-                far_entry,
-                place(300.0, -30.0),
-                far_exit,
-                turn(610.0, -30.0, 30.0),
-                turn(610.0, 30.0, 30.0),
-                place(520.0, 30.0),
-            ],
+            &[entry, from_far_back, exit, back, on(0.0), from_back, far_entry, far_back, far_exit],
         );
+        let next_entry = place(520.0, 30.0);
         town.street(
-            if side < 0.0 { "Expressway East" } else { "Expressway West" },
+            name,
             &EXPRESSWAY,
-            &[entry, place(-294.0, -30.0)],
+            &[far_exit, turn(610.0, -30.0, 30.0), turn(610.0, 30.0, 30.0), next_entry],
         );
         for x_m in [-150.0, 300.0] {
+            let arrives = place(x_m - 6.0, 30.0);
             town.street(
                 "Turnaround",
                 &TURNAROUND,
-                &[place(x_m, -30.0), turn(x_m + 49.1, 4.4, 17.0), place(x_m - 6.0, 30.0)],
+                &[on(x_m), turn(x_m + 49.1, 4.4, 17.0), arrives],
             );
         }
         let frontage = [-601.5, -148.5, 148.5, 501.5].map(|x_m| place(x_m, -120.0));

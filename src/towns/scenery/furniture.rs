@@ -35,62 +35,56 @@ const MEDIAN_M: f64 = 2.4;
 
 const CLOSE: Clearance = Clearance { roads_m: 0.2, junctions_m: 2.0, things_m: 1.0 };
 
-/// Kerbs of the whole map, junctions included, where a side-walk or a verge begins.
+/// Kerbs of the whole map, junctions included: where the carriageway ends and a side-walk, or a
+/// verge before one, begins.
 pub fn kerbs(map: &RoadMap, ground: &Ground, things: &mut Vec<Thing>) {
     for road in &map.opendrive().roads {
-        for section in 0..road.sections.len() {
-            let lanes = &road.sections[section].lanes;
-            for (index, lane) in lanes.iter().enumerate() {
-                let inwards = if lane.id > 0 { index + 1 } else { index.wrapping_sub(1) };
-                let is_edge =
-                    |kind: LaneKind| matches!(kind, LaneKind::Sidewalk | LaneKind::Border);
-                let begins = lanes.get(inwards).is_some_and(|inner| {
-                    !is_edge(inner.kind) && inner.id.signum() == lane.id.signum()
-                });
-                let is_walked = |i: usize| {
-                    lanes[i].kind == LaneKind::Sidewalk && lanes[i].id.signum() == lane.id.signum()
-                };
-                if is_edge(lane.kind) && begins && (0..lanes.len()).any(is_walked) {
-                    add_kerb(road, section, index, ground, things);
+        for (section, data) in road.sections.iter().enumerate() {
+            for is_left in [true, false] {
+                // From the middle outwards.
+                let mut side: Vec<usize> =
+                    (0..data.lanes.len()).filter(|i| (data.lanes[*i].id > 0) == is_left).collect();
+                side.sort_by_key(|index| data.lanes[*index].id.abs());
+                let kind = |index: &usize| data.lanes[*index].kind;
+                let is_beside = |kind| matches!(kind, LaneKind::Sidewalk | LaneKind::Border);
+                let first = side.iter().position(|index| is_beside(kind(index)));
+                let is_walked = side.iter().any(|index| kind(index) == LaneKind::Sidewalk);
+                if let Some(first) = first.filter(|first| is_walked && *first > 0) {
+                    add_kerb(road, section, side[first], ground, things);
                 }
             }
         }
     }
 }
 
+/// Stones along the inner edge of a lane, each as long as the edge is straight.
 fn add_kerb(road: &Road, section: usize, index: usize, ground: &Ground, things: &mut Vec<Thing>) {
     let outwards = f64::from(road.sections[section].lanes[index].id.signum());
     let place = |s_m: f64| {
         let edge_m = road.borders(section, index, s_m).inner_t_m + outwards * 0.5 * KERB_WIDTH_M;
         road.place(s_m, edge_m).truncate()
     };
-    let mut from_m: Option<f64> = None;
-    for s_m in steps_m(road, section, 0.5) {
-        let Some(start_m) = from_m else {
-            from_m = Some(s_m);
+    let steps_m = steps_m(road, section, 0.5);
+    let (mut from_m, to_m) = road.section_range_m(section);
+    for s_m in steps_m.into_iter().skip(1) {
+        let (start, end) = (place(from_m), place(s_m));
+        let middle_s_m = 0.5 * (from_m + s_m);
+        let off_m = place(middle_s_m).distance(0.5 * (start + end));
+        let length_m = start.distance(end);
+        if off_m < KERB_OFF_M && length_m < KERB_M && s_m < to_m {
             continue;
+        }
+        from_m = s_m;
+        let footprint = Footprint {
+            centre_m: 0.5 * (start + end),
+            half_m: 0.5 * DVec2::new(length_m, KERB_WIDTH_M),
+            heading_rad: (end - start).to_angle(),
         };
-        let (a, b) = (place(start_m), place(s_m));
-        let middle_m = place(0.5 * (start_m + s_m));
-        let is_bent = middle_m.distance(0.5 * (a + b)) > KERB_OFF_M;
-        let (_, to_m) = road.section_range_m(section);
-        if is_bent || a.distance(b) > KERB_M || s_m >= to_m {
-            let footprint = Footprint {
-                centre_m: 0.5 * (a + b),
-                half_m: DVec2::new(0.5 * a.distance(b), 0.5 * KERB_WIDTH_M),
-                heading_rad: (b - a).to_angle(),
-            };
-            let is_wide =
-                road.borders(section, index, 0.5 * (start_m + s_m)).width_m() > KERB_WIDTH_M;
-            if is_wide && !ground.is_driven(&footprint.grown(-0.05)) {
-                things.push(Thing {
-                    kind: Kind::Kerb,
-                    footprint,
-                    height_m: KERB_HEIGHT_M,
-                    colour: 0,
-                });
-            }
-            from_m = Some(s_m);
+        let is_there = road.borders(section, index, middle_s_m).width_m() > KERB_WIDTH_M;
+        // Edges touch what they bound: a little less must be free.
+        let core = Footprint { half_m: 0.5 * footprint.half_m, ..footprint };
+        if is_there && !ground.is_driven(&core) {
+            things.push(Thing { kind: Kind::Kerb, footprint, height_m: KERB_HEIGHT_M, colour: 0 });
         }
     }
 }
