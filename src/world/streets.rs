@@ -145,6 +145,11 @@ impl Lane {
         self.curvature_per_m[index.min(self.curvature_per_m.len() - 1)]
     }
 
+    /// Whether so much of a vehicle can stand here without standing in a junction.
+    pub fn has_room_to_stand(&self, needed_m: f64) -> bool {
+        self.junction.is_none() && self.length_m() >= needed_m
+    }
+
     /// The arc length beside `s_m` on a neighbour, which may be longer or shorter in a bend.
     pub fn beside_m(&self, s_m: f64, neighbour: &Lane) -> f64 {
         s_m / self.length_m() * neighbour.length_m()
@@ -287,11 +292,17 @@ impl Streets {
             return Some(Conflict { with: b, from_m, to_m, is_wide: false });
         }
         let (from_m, to_m) = self.overlap(a, b, WIDE_CONFLICT_M)?;
-        let here = self.lanes[a].course.at((from_m + to_m) / 2.0);
-        let (there_m, _) = self.lanes[b].course.project(here.position_m);
-        let turn_rad = here.forward.angle_to(self.lanes[b].course.at(there_m).forward).abs();
+        // Lanes that come to lie side by side meet at an angle before.
+        let turns = |at_m: f64| {
+            let here = self.lanes[a].course.at(at_m);
+            let (there_m, _) = self.lanes[b].course.project(here.position_m);
+            let turn_rad = here.forward.angle_to(self.lanes[b].course.at(there_m).forward).abs();
+            turn_rad > PARALLEL_RAD
+        };
+        let middle_m = (from_m + to_m) / 2.0;
         let is_wide = true;
-        (turn_rad > PARALLEL_RAD).then_some(Conflict { with: b, from_m, to_m, is_wide })
+        let meets = [from_m, middle_m, to_m].into_iter().any(turns);
+        meets.then_some(Conflict { with: b, from_m, to_m, is_wide })
     }
 
     /// The stretch of lane `a` that is nearer than `near_m` to lane `b`.

@@ -144,6 +144,7 @@ impl Walkers {
     pub fn hazards(&self) -> impl Iterator<Item = Hazard> {
         let on_street = |walker: &&Walker| matches!(walker.activity, Activity::Crossing { .. });
         self.walkers.iter().filter(on_street).map(|walker| Hazard {
+            actor: walker.id,
             position_m: walker.position_m,
             velocity_mps: walker.velocity_mps,
             radius_m: walker.kind.half_m().y,
