@@ -92,8 +92,8 @@ pub struct Reservations {
 }
 
 impl Reservations {
-    /// Ask for a way, unless the actor has asked for it already; who now knows more of it is let in
-    /// anew, unless it is in.
+    /// Ask for a way, unless the actor has asked for it already; who knows more of it now, or goes
+    /// another way, is let in anew, unless it is in.
     pub fn ask(&mut self, wanted: Claim) {
         let begins = |claim: &Claim| claim.lanes.iter().position(|lane| *lane == wanted.lanes[0]);
         let mut own = self.claims.iter_mut().filter(|claim| claim.actor == wanted.actor);
@@ -101,7 +101,7 @@ impl Reservations {
             self.claims.push(wanted);
             return;
         };
-        if wanted.lanes.len() > claim.lanes.len() - at {
+        if claim.lanes[at..] != wanted.lanes[..] {
             claim.lanes.truncate(at);
             claim.lanes.extend(wanted.lanes);
             claim.is_taken &= wanted.is_taken || at > 0;

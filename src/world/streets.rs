@@ -32,6 +32,9 @@ pub struct Spot {
     pub height_m: f64,
 }
 
+/// Between two junctions the longest vehicle has so much room to stand in, or nobody stops, m.
+const WAITING_M: f64 = 15.0;
+
 /// What differs in height by more than this is on another level: a bridge and what is below it, m.
 pub const LEVEL_M: f64 = 2.5;
 
@@ -145,9 +148,10 @@ impl Lane {
         self.curvature_per_m[index.min(self.curvature_per_m.len() - 1)]
     }
 
-    /// Whether so much of a vehicle can stand here without standing in a junction.
-    pub fn has_room_to_stand(&self, needed_m: f64) -> bool {
-        self.junction.is_none() && self.length_m() >= needed_m
+    /// Whether vehicles may stop here before the next junction. The same for all: a bicycle that
+    /// stops where a bus cannot would stand in the way of the bus, which needs both junctions.
+    pub fn is_waiting_place(&self) -> bool {
+        self.junction.is_none() && self.length_m() >= WAITING_M
     }
 
     /// The arc length beside `s_m` on a neighbour, which may be longer or shorter in a bend.

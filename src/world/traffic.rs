@@ -6,10 +6,11 @@ use crate::{
     noise::Noise,
     world::{
         car_following::{Ahead, Change, Idm, MOBIL},
+        kind::REST_GAP_M,
         occupancy::{Asker, Occupancy, Occupant},
         reservation::{ActorId, Claim, Reservations},
         streets::{LEVEL_M, LaneId, Streets},
-        vehicle::{ASIDE_MPS, ASIDE_PER_SPEED, ROOM_M, Vehicle, View},
+        vehicle::{ASIDE_MPS, ASIDE_PER_SPEED, Vehicle, View},
     },
 };
 
@@ -34,6 +35,9 @@ const ASK_M: f64 = 20.0;
 
 /// Longer than twice this, a vehicle needs more room in bends than cars do, m.
 const WIDE_M: f64 = 3.2;
+
+/// Least room behind a junction, beyond the own length, m.
+const ROOM_M: f64 = 3.0;
 
 /// How long drivers wait for room before they think of another way, s.
 const PATIENCE_S: f64 = 12.0;
@@ -264,25 +268,31 @@ impl Traffic {
         })
     }
 
-    /// Whether a vehicle could stand behind the junction, with all who are on their way there.
+    /// Whether a vehicle could stand behind the junction, with all who are on their way there: now,
+    /// and when all of them queue at the next one.
     fn has_room(&self, streets: &Streets, way: &Way, through: &[LaneId]) -> bool {
         let Some(last) = through.last() else { return true };
         let Some(at) = way.lanes.iter().position(|lane| lane == last) else { return true };
-        let Some(exit) = way.lanes.get(at + 1) else { return true };
-        let needed_m = 2.0 * way.half_length_m + ROOM_M;
-        let asker = Asker { actor: way.actor, s_m: 0.0, half_length_m: 0.0 };
-        let beyond = way.lanes[at + 1..].iter().copied();
-        let Some(ahead) = self.occupancy.ahead(streets, beyond, asker, needed_m + 25.0) else {
-            return true;
-        };
+        let beyond = &way.lanes[at + 1..];
+        let Some(exit) = beyond.first() else { return true };
         let on_their_way = self.reservations.claims().iter().filter(|claim| {
             claim.is_taken
                 && claim.actor != way.actor
                 && claim.lanes.last().is_some_and(|lane| streets.lanes[*lane].next.contains(exit))
         });
-        let taken_m = 7.0 * on_their_way.count() as f64;
+        let theirs_m: f64 = on_their_way.map(|claim| claim.length_m + REST_GAP_M).sum();
+        let needed_m = 2.0 * way.half_length_m + ROOM_M + theirs_m;
+
+        let asker = Asker { actor: way.actor, s_m: 0.0, half_length_m: 0.0 };
+        let ahead = self.occupancy.ahead(streets, beyond.iter().copied(), asker, HORIZON_M);
         // Who moves on will have made room.
-        ahead.gap_m + 3.0 * ahead.speed_mps - taken_m > needed_m
+        let has_now = |ahead: Ahead| ahead.gap_m + 3.0 * ahead.speed_mps > needed_m;
+        let queue = || beyond.iter().take_while(|lane| streets.lanes[**lane].junction.is_none());
+        let length_m: f64 = queue().map(|lane| streets.lanes[*lane].length_m()).sum();
+        let bodies = queue().flat_map(|lane| self.occupancy.on(*lane));
+        let others = bodies.filter(|body| body.actor != way.actor);
+        let taken_m: f64 = others.map(|body| 2.0 * body.half_length_m + REST_GAP_M).sum();
+        ahead.is_none_or(has_now) && length_m - taken_m > needed_m
     }
 
     /// What a driver sees, and makes of it.
@@ -470,10 +480,9 @@ impl Way {
         let first = self.lanes.iter().position(is_inside)?;
         let before = self.lanes[..first].iter().map(|lane| streets.lanes[*lane].length_m());
         let distance_m = before.sum::<f64>() - self.s_m - self.half_length_m;
-        let needed_m = 2.0 * self.half_length_m + ROOM_M;
         let mut lanes: Vec<LaneId> = self.lanes[first..]
             .iter()
-            .take_while(|lane| !streets.lanes[**lane].has_room_to_stand(needed_m))
+            .take_while(|lane| !streets.lanes[**lane].is_waiting_place())
             .copied()
             .collect();
         while lanes.last().is_some_and(|lane| !is_inside(lane)) {

@@ -21,9 +21,6 @@ use crate::{
 const PLAN_M: f64 = 120.0;
 const LONGEST_PLAN_M: f64 = 400.0;
 
-/// Between two junctions a vehicle has to have this much room more than its length to stand, m.
-pub const ROOM_M: f64 = 3.0;
-
 /// How fast a vehicle moves aside: at most, m/s, and per speed.
 pub const ASIDE_MPS: f64 = 1.1;
 pub const ASIDE_PER_SPEED: f64 = 0.22;
@@ -137,9 +134,8 @@ impl Vehicle {
         let mut length_m: f64 = self.way().map(|lane| streets.lanes[lane].length_m()).sum();
         loop {
             let last = self.plan.back().copied().unwrap_or(self.lane);
-            let ends_where_one_stands =
-                streets.lanes[last].has_room_to_stand(2.0 * self.half_m.x + ROOM_M);
-            let enough_m = if ends_where_one_stands { PLAN_M } else { LONGEST_PLAN_M };
+            let enough_m =
+                if streets.lanes[last].is_waiting_place() { PLAN_M } else { LONGEST_PLAN_M };
             let next = &streets.lanes[last].next;
             if length_m - self.s_m >= enough_m || next.is_empty() {
                 break;
