@@ -14,9 +14,9 @@ use crate::{
         episode::{End, Outcome, drive},
         expert::{Expert, ExpertConfig},
         route::Route,
+        simulation::{Start, World},
         town::Town,
         walkers::Crossings,
-        world::{Start, World},
     },
 };
 

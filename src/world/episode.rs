@@ -7,7 +7,7 @@ use crate::{
     world::{
         contact::Contact,
         scoring::Sums,
-        world::{SUBSTEPS, World},
+        simulation::{SUBSTEPS, World},
     },
 };
 

@@ -11,10 +11,10 @@ use crate::{
         car_following::{Ahead, Idm},
         footprint::Footprint,
         route::{Route, Waypoint},
+        simulation::World,
         snapshot::Snapshot,
         streets::LEVEL_M,
         traffic::STEP_S,
-        world::World,
     },
 };
 

@@ -138,7 +138,7 @@ pub const VEHICLES: [VehicleModel; 7] = [
 ];
 
 /// Gap at rest, m.
-const REST_GAP_M: f64 = 2.0;
+pub const REST_GAP_M: f64 = 2.0;
 
 impl VehicleModel {
     /// Any kind, by its share of the traffic.

@@ -10,7 +10,8 @@ use crate::world::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Occupant {
     pub actor: ActorId,
-    /// Arc length of its middle, m.
+    /// Arc length of its middle, m; negative if it is on its way there and may enter, so that those
+    /// who merge see it in time.
     pub s_m: f64,
     pub half_length_m: f64,
     /// Along the lane, m/s.
@@ -85,7 +86,8 @@ impl Occupancy {
             for &(sibling, together_m) in streets.siblings(lane) {
                 for body in &self.by_lane[sibling] {
                     let at_m = start_m + body.s_m;
-                    if body.s_m - body.half_length_m < together_m && is_ahead(at_m, body) {
+                    let is_together = body.s_m - body.half_length_m < together_m;
+                    if body.s_m >= 0.0 && is_together && is_ahead(at_m, body) {
                         meet(at_m, body);
                         break;
                     }
@@ -129,7 +131,7 @@ impl Occupancy {
         }
         let last = |before: &LaneId| {
             let length_m = streets.lanes[*before].length_m();
-            let body = self.by_lane[*before].iter().filter(others).last()?;
+            let body = self.by_lane[*before].iter().rfind(others)?;
             Some((asker.s_m + length_m - body.s_m, body))
         };
         let behind = streets.lanes[lane].previous.iter().filter_map(last);

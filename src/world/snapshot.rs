@@ -8,6 +8,10 @@ use crate::world::{
     footprint::Footprint,
     kind::{VehicleKind, WalkerKind},
     reservation::ActorId,
+    streets::Streets,
+    traffic::Traffic,
+    vehicle::Vehicle,
+    walkers::{Seen, Walker, Walkers},
 };
 
 /// Brake lamps come on at this, m/s2.
@@ -28,7 +32,31 @@ pub struct VehicleState {
     pub colour: f64,
 }
 
+/// The vehicles of the traffic as they are now.
+pub fn vehicle_states(streets: &Streets, traffic: &Traffic) -> Vec<VehicleState> {
+    let state = |vehicle: &Vehicle| {
+        let footprint = vehicle.footprint(streets);
+        VehicleState {
+            id: vehicle.id,
+            kind: vehicle.model.kind,
+            footprint,
+            ground_m: vehicle.spot(streets, 0.0).height_m,
+            height_m: vehicle.height_m,
+            velocity_mps: vehicle.velocity_mps(&footprint),
+            acceleration_mps2: vehicle.acceleration_mps2,
+            colour: vehicle.colour,
+        }
+    };
+    traffic.vehicles.iter().map(state).collect()
+}
+
 impl VehicleState {
+    /// As people on foot see it.
+    pub fn seen(&self) -> Seen {
+        let speed_mps = self.velocity_mps.length();
+        Seen { footprint: self.footprint, height_m: self.ground_m, speed_mps }
+    }
+
     /// Whether its brake lamps are on.
     pub fn is_braking(&self) -> bool {
         self.acceleration_mps2 < BRAKE_LAMPS_MPS2 || self.velocity_mps.length() < 0.1
@@ -52,6 +80,21 @@ pub struct WalkerState {
     pub colour: f64,
 }
 
+/// Everybody on foot as they are now.
+pub fn walker_states(walkers: &Walkers) -> Vec<WalkerState> {
+    let state = |walker: &Walker| WalkerState {
+        id: walker.id,
+        kind: walker.kind,
+        footprint: walker.footprint(),
+        ground_m: walker.height_m,
+        velocity_mps: walker.velocity_mps,
+        is_jaywalking: walker.is_jaywalking,
+        is_crossing: walker.is_crossing(),
+        colour: walker.colour,
+    };
+    walkers.walkers.iter().map(state).collect()
+}
+
 /// All that moves, at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
@@ -68,34 +111,11 @@ pub struct Snapshot {
 impl Snapshot {
     /// A hash of every number of the state: two worlds that agree in it are the same.
     pub fn hash(&self) -> u64 {
-        let mut hasher = Sha256::new();
-        let mut add = |values: &[f64]| values.iter().for_each(|v| hasher.update(v.to_le_bytes()));
         let ego = &self.ego;
         let [x, y] = ego.position_m.to_array();
-        add(&[
-            self.time_s,
-            x,
-            y,
-            ego.yaw_rad,
-            ego.speed_mps,
-            ego.steer_rad,
-            ego.throttle,
-            ego.brake,
-        ]);
-        let mut add_body = |id: ActorId, footprint: &Footprint, velocity_mps: DVec2| {
-            let Footprint { centre_m, forward, half_m } = footprint;
-            let pairs = [*centre_m, *forward, *half_m, velocity_mps];
-            add(&[f64::from(id)]);
-            pairs.iter().for_each(|pair| add(&pair.to_array()));
-        };
-        for vehicle in &self.vehicles {
-            add_body(vehicle.id, &vehicle.footprint, vehicle.velocity_mps);
-        }
-        for walker in &self.walkers {
-            add_body(walker.id, &walker.footprint, walker.velocity_mps);
-        }
-        let digest = hasher.finalize();
-        digest.iter().take(8).fold(0, |hash, byte| hash << 8 | u64::from(*byte))
+        let own =
+            [self.time_s, x, y, ego.yaw_rad, ego.speed_mps, ego.steer_rad, ego.throttle, ego.brake];
+        hash(&own, &self.vehicles, &self.walkers)
     }
 
     /// The same world a share of the way to `next`, for those who move: agents live in steps of
@@ -120,4 +140,25 @@ impl Snapshot {
                 .collect(),
         }
     }
+}
+
+/// A hash of numbers and of every number of these bodies.
+pub fn hash(numbers: &[f64], vehicles: &[VehicleState], walkers: &[WalkerState]) -> u64 {
+    let mut hasher = Sha256::new();
+    let mut add = |values: &[f64]| values.iter().for_each(|v| hasher.update(v.to_le_bytes()));
+    add(numbers);
+    let mut add_body = |id: ActorId, footprint: &Footprint, velocity_mps: DVec2| {
+        let Footprint { centre_m, forward, half_m } = footprint;
+        let pairs = [*centre_m, *forward, *half_m, velocity_mps];
+        add(&[f64::from(id)]);
+        pairs.iter().for_each(|pair| add(&pair.to_array()));
+    };
+    for vehicle in vehicles {
+        add_body(vehicle.id, &vehicle.footprint, vehicle.velocity_mps);
+    }
+    for walker in walkers {
+        add_body(walker.id, &walker.footprint, walker.velocity_mps);
+    }
+    let digest = hasher.finalize();
+    digest.iter().take(8).fold(0, |hash, byte| hash << 8 | u64::from(*byte))
 }

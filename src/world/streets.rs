@@ -32,6 +32,9 @@ pub struct Spot {
     pub height_m: f64,
 }
 
+/// Between two junctions the longest vehicle has so much room to stand in, or nobody stops, m.
+const WAITING_M: f64 = 15.0;
+
 /// What differs in height by more than this is on another level: a bridge and what is below it, m.
 pub const LEVEL_M: f64 = 2.5;
 
@@ -143,6 +146,12 @@ impl Lane {
     pub fn curvature_per_m(&self, s_m: f64) -> f64 {
         let index = (s_m.max(0.0) / self.course.step_m) as usize;
         self.curvature_per_m[index.min(self.curvature_per_m.len() - 1)]
+    }
+
+    /// Whether vehicles may stop here before the next junction. The same for all: a bicycle that
+    /// stops where a bus cannot would stand in the way of the bus, which needs both junctions.
+    pub fn is_waiting_place(&self) -> bool {
+        self.junction.is_none() && self.length_m() >= WAITING_M
     }
 
     /// The arc length beside `s_m` on a neighbour, which may be longer or shorter in a bend.
@@ -287,11 +296,17 @@ impl Streets {
             return Some(Conflict { with: b, from_m, to_m, is_wide: false });
         }
         let (from_m, to_m) = self.overlap(a, b, WIDE_CONFLICT_M)?;
-        let here = self.lanes[a].course.at((from_m + to_m) / 2.0);
-        let (there_m, _) = self.lanes[b].course.project(here.position_m);
-        let turn_rad = here.forward.angle_to(self.lanes[b].course.at(there_m).forward).abs();
+        // Lanes that come to lie side by side meet at an angle before.
+        let turns = |at_m: f64| {
+            let here = self.lanes[a].course.at(at_m);
+            let (there_m, _) = self.lanes[b].course.project(here.position_m);
+            let turn_rad = here.forward.angle_to(self.lanes[b].course.at(there_m).forward).abs();
+            turn_rad > PARALLEL_RAD
+        };
+        let middle_m = (from_m + to_m) / 2.0;
         let is_wide = true;
-        (turn_rad > PARALLEL_RAD).then_some(Conflict { with: b, from_m, to_m, is_wide })
+        let meets = [from_m, middle_m, to_m].into_iter().any(turns);
+        meets.then_some(Conflict { with: b, from_m, to_m, is_wide })
     }
 
     /// The stretch of lane `a` that is nearer than `near_m` to lane `b`.

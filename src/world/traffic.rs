@@ -6,11 +6,11 @@ use crate::{
     noise::Noise,
     world::{
         car_following::{Ahead, Change, Idm, MOBIL},
-        footprint::Footprint,
+        kind::REST_GAP_M,
         occupancy::{Asker, Occupancy, Occupant},
         reservation::{ActorId, Claim, Reservations},
         streets::{LEVEL_M, LaneId, Streets},
-        vehicle::Vehicle,
+        vehicle::{ASIDE_MPS, ASIDE_PER_SPEED, Vehicle, View},
     },
 };
 
@@ -51,6 +51,7 @@ const FORESIGHT_S: f64 = 3.0;
 /// Somebody or something on the street that does not keep to lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hazard {
+    pub actor: ActorId,
     pub position_m: DVec2,
     pub velocity_mps: DVec2,
     pub radius_m: f64,
@@ -63,8 +64,10 @@ pub struct Hazard {
 pub struct EgoOnLanes {
     /// The lanes that its body is on.
     pub bodies: Vec<(LaneId, Occupant)>,
-    /// Lanes of the route from here on, and the arc length of the rear on the first of them, m.
+    /// Lanes of the route from here on, and the arc length of the middle on the first of them, m.
     pub way: Vec<LaneId>,
+    /// Lanes of the route that the rear has not left, the last one first.
+    pub tail: Vec<LaneId>,
     pub s_m: f64,
     pub half_length_m: f64,
     pub speed_mps: f64,
@@ -128,15 +131,14 @@ impl Traffic {
     /// Let [`STEP_S`] pass.
     pub fn step(&mut self, streets: &Streets, ego: Option<&EgoOnLanes>, hazards: &[Hazard]) {
         self.steps += 1;
-        self.place_bodies(streets, ego);
-        self.settle_claims(streets, ego);
-        let accelerations: Vec<f64> = self
-            .vehicles
-            .iter()
-            .map(|vehicle| self.acceleration(streets, vehicle, hazards))
-            .collect();
-        for (vehicle, acceleration) in self.vehicles.iter_mut().zip(accelerations) {
-            vehicle.advance(streets, acceleration, STEP_S);
+        let ways = self.ways(streets, ego);
+        self.place_bodies(streets, ego, &ways);
+        self.settle_claims(streets, &ways);
+        let views: Vec<View> =
+            self.vehicles.iter().map(|vehicle| self.view(streets, vehicle, hazards)).collect();
+        for (vehicle, view) in self.vehicles.iter_mut().zip(views) {
+            vehicle.view = view;
+            vehicle.advance(streets, view.wanted_mps2, STEP_S);
         }
         self.change_lanes(streets);
         self.look_for_other_ways(streets);
@@ -153,7 +155,7 @@ impl Traffic {
         self.occupancy.ahead(streets, way, asker, horizon_m)
     }
 
-    fn place_bodies(&mut self, streets: &Streets, ego: Option<&EgoOnLanes>) {
+    fn place_bodies(&mut self, streets: &Streets, ego: Option<&EgoOnLanes>, ways: &[Way]) {
         self.occupancy.clear(streets.lanes.len());
         for vehicle in &self.vehicles {
             let body = body_of(vehicle);
@@ -167,40 +169,66 @@ impl Traffic {
         for (lane, body) in ego.iter().flat_map(|ego| &ego.bodies) {
             self.occupancy.insert(*lane, *body);
         }
+        for way in ways {
+            for claim in self.reservations.claims() {
+                if claim.actor != way.actor || !claim.is_taken {
+                    continue;
+                }
+                let mut start_m = -way.s_m;
+                for (index, lane) in way.lanes.iter().enumerate() {
+                    if index > 0 && claim.lanes.contains(lane) {
+                        self.occupancy.insert(*lane, Occupant { s_m: -start_m, ..way.body() });
+                    }
+                    start_m += streets.lanes[*lane].length_m();
+                }
+            }
+        }
     }
 
-    fn settle_claims(&mut self, streets: &Streets, ego: Option<&EgoOnLanes>) {
-        let step = self.steps;
-        let mut asked = Vec::new();
-        for vehicle in &self.vehicles {
-            let way: Vec<LaneId> = vehicle.way().collect();
-            let comfort = vehicle.model.comfort_mps2;
-            asked.push(Way {
-                actor: vehicle.id,
-                lanes: way,
-                s_m: vehicle.s_m,
-                half_length_m: vehicle.half_m.x,
-                ask_m: ASK_M + vehicle.speed_mps.powi(2) / (2.0 * comfort),
+    /// Where everybody goes.
+    fn ways(&self, streets: &Streets, ego: Option<&EgoOnLanes>) -> Vec<Way> {
+        let way = |vehicle: &Vehicle| Way {
+            actor: vehicle.id,
+            lanes: vehicle.way().collect(),
+            tail: vehicle.tail(streets).collect(),
+            s_m: vehicle.s_m,
+            half_length_m: vehicle.half_m.x,
+            speed_mps: vehicle.speed_mps,
+            ask_m: ASK_M + vehicle.speed_mps.powi(2) / (2.0 * vehicle.model.comfort_mps2),
+        };
+        let ego = ego.map(|ego| Way {
+            actor: EGO,
+            lanes: ego.way.clone(),
+            tail: ego.tail.clone(),
+            s_m: ego.s_m,
+            half_length_m: ego.half_length_m,
+            speed_mps: ego.speed_mps,
+            ask_m: ASK_M + ego.speed_mps.powi(2) / 4.0,
+        });
+        self.vehicles.iter().map(way).chain(ego).collect()
+    }
+
+    fn settle_claims(&mut self, streets: &Streets, ways: &[Way]) {
+        for way in ways {
+            let through = way.through(streets);
+            self.reservations.forget(way.actor, |claim| {
+                let is_next = through.as_ref().is_some_and(|(lanes, _)| claim.lanes[0] == lanes[0]);
+                is_next || way.is_on(&claim.lanes)
             });
-        }
-        if let Some(ego) = ego {
-            asked.push(Way {
-                actor: EGO,
-                lanes: ego.way.clone(),
-                s_m: ego.s_m,
-                half_length_m: ego.half_length_m,
-                ask_m: ASK_M + ego.speed_mps.powi(2) / 4.0,
-            });
-        }
-        for way in &asked {
-            let rear_m = way.s_m - way.half_length_m;
-            let keep: Vec<LaneId> = way.lanes.clone();
-            self.reservations.forget(way.actor, &keep);
-            if let Some((lanes, distance_m)) = way.through(streets)
+            if let Some((lanes, distance_m)) = through
                 && distance_m < way.ask_m
             {
-                let is_wide = way.half_length_m > WIDE_M;
-                self.reservations.ask(way.actor, is_wide, &lanes, step, distance_m <= 0.0);
+                self.reservations.ask(Claim {
+                    actor: way.actor,
+                    lanes,
+                    since: self.steps,
+                    is_taken: distance_m <= 0.0,
+                    has_room: false,
+                    is_wide: way.half_length_m > WIDE_M,
+                    length_m: 2.0 * way.half_length_m,
+                    speed_mps: way.speed_mps,
+                    rear: (0, 0.0),
+                });
             }
             let may_go = |lanes: &[LaneId]| {
                 self.is_at_the_head(way, lanes) && self.has_room(streets, way, lanes)
@@ -212,14 +240,14 @@ impl Traffic {
                 .enumerate()
                 .filter(|(_, claim)| claim.actor == way.actor)
                 .map(|(index, claim)| {
-                    let at = claim.lanes.iter().position(|lane| *lane == way.lanes[0]);
-                    let rear = at.map_or((0, f64::NEG_INFINITY), |at| (at, rear_m));
+                    let rear = way.rear_among(&claim.lanes, streets);
                     (index, rear, claim.is_taken || may_go(&claim.lanes))
                 })
                 .collect();
             for (index, rear, has_room) in updates {
                 let claim: &mut Claim = &mut self.reservations.claims_mut()[index];
                 claim.rear = rear;
+                claim.speed_mps = way.speed_mps;
                 claim.has_room = has_room;
             }
         }
@@ -240,36 +268,49 @@ impl Traffic {
         })
     }
 
-    /// Whether a vehicle could stand behind the junction, with all who are on their way there.
+    /// Whether a vehicle could stand behind the junction, with all who are on their way there: now,
+    /// and when all of them queue at the next one.
     fn has_room(&self, streets: &Streets, way: &Way, through: &[LaneId]) -> bool {
         let Some(last) = through.last() else { return true };
         let Some(at) = way.lanes.iter().position(|lane| lane == last) else { return true };
-        let Some(exit) = way.lanes.get(at + 1) else { return true };
-        let needed_m = 2.0 * way.half_length_m + ROOM_M;
-        let asker = Asker { actor: way.actor, s_m: 0.0, half_length_m: 0.0 };
-        let beyond = way.lanes[at + 1..].iter().copied();
-        let Some(ahead) = self.occupancy.ahead(streets, beyond, asker, needed_m + 25.0) else {
-            return true;
-        };
+        let beyond = &way.lanes[at + 1..];
+        let Some(exit) = beyond.first() else { return true };
         let on_their_way = self.reservations.claims().iter().filter(|claim| {
             claim.is_taken
                 && claim.actor != way.actor
                 && claim.lanes.last().is_some_and(|lane| streets.lanes[*lane].next.contains(exit))
         });
-        let taken_m = 7.0 * on_their_way.count() as f64;
+        let theirs_m: f64 = on_their_way.map(|claim| claim.length_m + REST_GAP_M).sum();
+        let needed_m = 2.0 * way.half_length_m + ROOM_M + theirs_m;
+
+        let asker = Asker { actor: way.actor, s_m: 0.0, half_length_m: 0.0 };
+        let ahead = self.occupancy.ahead(streets, beyond.iter().copied(), asker, HORIZON_M);
         // Who moves on will have made room.
-        ahead.gap_m + 3.0 * ahead.speed_mps - taken_m > needed_m
+        let has_now = |ahead: Ahead| ahead.gap_m + 3.0 * ahead.speed_mps > needed_m;
+        let queue = || beyond.iter().take_while(|lane| streets.lanes[**lane].junction.is_none());
+        let length_m: f64 = queue().map(|lane| streets.lanes[*lane].length_m()).sum();
+        let bodies = queue().flat_map(|lane| self.occupancy.on(*lane));
+        let others = bodies.filter(|body| body.actor != way.actor);
+        let taken_m: f64 = others.map(|body| 2.0 * body.half_length_m + REST_GAP_M).sum();
+        ahead.is_none_or(has_now) && length_m - taken_m > needed_m
     }
 
-    fn acceleration(&self, streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> f64 {
+    /// What a driver sees, and makes of it.
+    fn view(&self, streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> View {
         let idm = vehicle.model.idm();
-        let (speed, wish) = (vehicle.speed_mps, wish_mps(streets, vehicle));
+        let wish_mps = wish_mps(streets, vehicle);
+        let wants = |ahead| idm.acceleration_mps2(vehicle.speed_mps, wish_mps, ahead);
         let ahead = self.occupancy.ahead(streets, vehicle.way(), vehicle.asker(), HORIZON_M);
-        let ahead =
-            [ahead, self.line_ahead(streets, vehicle), hazard_ahead(streets, vehicle, hazards)];
-        let wanted = ahead.iter().flatten().map(|a| idm.acceleration_mps2(speed, wish, Some(*a)));
-        let free = idm.acceleration_mps2(speed, wish, None);
-        wanted.fold(free, f64::min).max(-HARDEST_MPS2)
+        let line = self.line_ahead(streets, vehicle);
+        let on_lanes = wants(None).min(wants(ahead)).min(wants(line));
+        let hazard = hazard_ahead(streets, vehicle, hazards);
+        let for_hazard = hazard.map_or(f64::INFINITY, |(_, ahead)| wants(Some(ahead)));
+        View {
+            wish_mps,
+            ahead,
+            yields_to: hazard.filter(|_| for_hazard < on_lanes).map(|(actor, _)| actor),
+            wanted_mps2: on_lanes.min(for_hazard).max(-HARDEST_MPS2),
+        }
     }
 
     /// The line before a junction that the vehicle may not enter yet.
@@ -298,9 +339,10 @@ impl Traffic {
             let waits =
                 |claim: &Claim| claim.actor == vehicle.id && !claim.is_taken && !claim.has_room;
             let for_long = vehicle.standing_s > PATIENCE_S
-                && (vehicle.standing_s / STEP_S).round() as u64 % (PATIENCE_S / STEP_S) as u64 == 0;
+                && ((vehicle.standing_s / STEP_S).round() as u64)
+                    .is_multiple_of((PATIENCE_S / STEP_S) as u64);
             if for_long && self.reservations.claims().iter().any(waits) {
-                self.reservations.forget(vehicle.id, &[]);
+                self.reservations.forget(vehicle.id, |_| false);
                 vehicle.plan_anew(streets);
             }
         }
@@ -310,7 +352,8 @@ impl Traffic {
         for index in 0..self.vehicles.len() {
             let vehicle = &self.vehicles[index];
             // Once a second, not all in the same step.
-            if (self.steps + u64::from(vehicle.id)) % 10 != 0 || vehicle.leaving.is_some() {
+            if !(self.steps + u64::from(vehicle.id)).is_multiple_of(10) || vehicle.leaving.is_some()
+            {
                 continue;
             }
             if let Some(to) = self.better_lane(streets, vehicle) {
@@ -340,7 +383,11 @@ impl Traffic {
             let ahead = self.occupancy.ahead(streets, way, asker, HORIZON_M);
             idm.acceleration_mps2(vehicle.speed_mps, wish, ahead)
         };
-        let before = own(&mut vehicle.way(), vehicle.asker());
+        let ahead = self.occupancy.ahead(streets, vehicle.way(), vehicle.asker(), HORIZON_M);
+        let before = idm.acceleration_mps2(vehicle.speed_mps, wish, ahead);
+        if ahead.is_some_and(|ahead| !comes_clear_of(vehicle, lane.width_m, ahead)) {
+            return None;
+        }
         let is_wanted = |to: &LaneId| {
             let target = &streets.lanes[*to];
             let asker = Asker { s_m: lane.beside_m(vehicle.s_m, target), ..vehicle.asker() };
@@ -371,6 +418,18 @@ impl Traffic {
     }
 }
 
+/// Whether a vehicle is out of its lane before it reaches who is ahead there, if it changes now.
+fn comes_clear_of(vehicle: &Vehicle, width_m: f64, ahead: Ahead) -> bool {
+    /// It may speed up so much meanwhile, as a share of its speed.
+    const FASTER: f64 = 1.25;
+    let speed_mps = vehicle.speed_mps;
+    // Bodies in the middle of their lanes are clear of each other when one is half a lane aside
+    // and half its own width.
+    let aside_m = width_m / 2.0 + vehicle.half_m.y;
+    let clear_s = aside_m / ASIDE_MPS.min(ASIDE_PER_SPEED * speed_mps);
+    ahead.gap_m > (FASTER * speed_mps - ahead.speed_mps).max(0.0) * clear_s + 1.0
+}
+
 /// How the one behind is taken to follow, when a lane is changed.
 const FOLLOWER: Idm =
     Idm { acceleration_mps2: 1.5, comfort_mps2: 2.0, time_gap_s: 1.2, rest_gap_m: 2.0 };
@@ -381,11 +440,41 @@ struct Way {
     lanes: Vec<LaneId>,
     s_m: f64,
     half_length_m: f64,
+    speed_mps: f64,
+    /// Lanes that its rear has not left, the last one first.
+    tail: Vec<LaneId>,
     /// From where on it asks, m before the junction.
     ask_m: f64,
 }
 
 impl Way {
+    fn body(&self) -> Occupant {
+        let Way { actor, s_m, half_length_m, speed_mps, .. } = *self;
+        Occupant { actor, s_m, half_length_m, speed_mps }
+    }
+
+    /// Whether any part of the body is on one of `lanes`.
+    fn is_on(&self, lanes: &[LaneId]) -> bool {
+        lanes.contains(&self.lanes[0]) || self.tail.iter().any(|lane| lanes.contains(lane))
+    }
+
+    /// Which of `lanes` the rear is on, and its arc length there, m; the first and a negative one
+    /// if it has yet to come there.
+    fn rear_among(&self, lanes: &[LaneId], streets: &Streets) -> (usize, f64) {
+        let mut rear_m = self.s_m - self.half_length_m;
+        let mut at = self.lanes[0];
+        for lane in &self.tail {
+            at = *lane;
+            rear_m += streets.lanes[at].length_m();
+        }
+        if let Some(index) = lanes.iter().position(|lane| *lane == at) {
+            return (index, rear_m);
+        }
+        let before = self.lanes.iter().take_while(|lane| Some(*lane) != lanes.first());
+        let to_first_m: f64 = before.map(|lane| streets.lanes[*lane].length_m()).sum();
+        (0, self.s_m - self.half_length_m - to_first_m)
+    }
+
     /// The lanes through the next junction, and on to where there is room to stand between two
     /// junctions; and the distance of the front from the first of them, m.
     fn through(&self, streets: &Streets) -> Option<(Vec<LaneId>, f64)> {
@@ -393,11 +482,9 @@ impl Way {
         let first = self.lanes.iter().position(is_inside)?;
         let before = self.lanes[..first].iter().map(|lane| streets.lanes[*lane].length_m());
         let distance_m = before.sum::<f64>() - self.s_m - self.half_length_m;
-        let too_short =
-            |lane: &LaneId| streets.lanes[*lane].length_m() < 2.0 * self.half_length_m + ROOM_M;
         let mut lanes: Vec<LaneId> = self.lanes[first..]
             .iter()
-            .take_while(|lane| is_inside(lane) || too_short(lane))
+            .take_while(|lane| !streets.lanes[**lane].is_waiting_place())
             .copied()
             .collect();
         while lanes.last().is_some_and(|lane| !is_inside(lane)) {
@@ -448,7 +535,11 @@ fn wish_mps(streets: &Streets, vehicle: &Vehicle) -> f64 {
 }
 
 /// Somebody on the vehicle's way, now or when it will be there.
-fn hazard_ahead(streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> Option<Ahead> {
+fn hazard_ahead(
+    streets: &Streets,
+    vehicle: &Vehicle,
+    hazards: &[Hazard],
+) -> Option<(ActorId, Ahead)> {
     const STEP_M: f64 = 1.5;
     let reach_m = vehicle.half_m.x + vehicle.speed_mps.powi(2) / 8.0 + 10.0;
     let here = vehicle.spot(streets, 0.0);
@@ -476,16 +567,11 @@ fn hazard_ahead(streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> Opt
         if let Some(hazard) = near.iter().find(is_there) {
             let along = hazard.velocity_mps.dot(spot.forward).max(0.0);
             let gap_m = at_m - vehicle.half_m.x - hazard.radius_m;
-            return Some(Ahead { gap_m, speed_mps: along });
+            return Some((hazard.actor, Ahead { gap_m, speed_mps: along }));
         }
         at_m += STEP_M;
     }
     None
-}
-
-/// Footprints of all vehicles, in their order.
-pub fn footprints(streets: &Streets, traffic: &Traffic) -> Vec<Footprint> {
-    traffic.vehicles.iter().map(|vehicle| vehicle.footprint(streets)).collect()
 }
 
 #[cfg(test)]
@@ -567,7 +653,13 @@ mod tests {
         let vehicle = &traffic.vehicles[0];
         let stop_m = vehicle.half_m.x + vehicle.speed_mps.powi(2) / (2.0 * 4.0) + 3.0;
         let position_m = vehicle.spot(&streets, stop_m).position_m;
-        let hazard = Hazard { position_m, velocity_mps: DVec2::ZERO, radius_m: 0.3, height_m: 0.0 };
+        let hazard = Hazard {
+            actor: EGO,
+            position_m,
+            velocity_mps: DVec2::ZERO,
+            radius_m: 0.3,
+            height_m: 0.0,
+        };
         for _ in 0..100 {
             traffic.step(&streets, None, &[hazard]);
             let footprint = traffic.vehicles[0].footprint(&streets);

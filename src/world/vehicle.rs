@@ -7,6 +7,7 @@ use glam::DVec2;
 use crate::{
     noise::Noise,
     world::{
+        car_following::Ahead,
         footprint::Footprint,
         kind::VehicleModel,
         occupancy::Asker,
@@ -15,12 +16,14 @@ use crate::{
     },
 };
 
-/// How far ahead a vehicle knows its way, m.
+/// How far ahead a vehicle knows its way, m; further where that would end inside a junction, up to
+/// the second length.
 const PLAN_M: f64 = 120.0;
+const LONGEST_PLAN_M: f64 = 400.0;
 
 /// How fast a vehicle moves aside: at most, m/s, and per speed.
-const ASIDE_MPS: f64 = 1.1;
-const ASIDE_PER_SPEED: f64 = 0.22;
+pub const ASIDE_MPS: f64 = 1.1;
+pub const ASIDE_PER_SPEED: f64 = 0.22;
 
 /// A vehicle of the traffic.
 #[derive(Clone, Debug)]
@@ -46,11 +49,25 @@ pub struct Vehicle {
     pub acceleration_mps2: f64,
     /// How long it has stood, s.
     pub standing_s: f64,
+    /// Of the last step.
+    pub view: View,
     /// Lanes behind, the last one first, as far as its rear needs them.
     behind: VecDeque<LaneId>,
     /// Lanes ahead.
     plan: VecDeque<LaneId>,
     noise: Noise,
+}
+
+/// What a driver sees, and makes of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct View {
+    /// The speed that the driver wants here.
+    pub wish_mps: f64,
+    /// The next body on the way.
+    pub ahead: Option<Ahead>,
+    /// Who steps into the way and makes the driver brake more than all else does.
+    pub yields_to: Option<ActorId>,
+    pub wanted_mps2: f64,
 }
 
 impl Vehicle {
@@ -83,6 +100,7 @@ impl Vehicle {
             speed_mps: 0.0,
             acceleration_mps2: 0.0,
             standing_s: 0.0,
+            view: View::default(),
             behind: VecDeque::new(),
             plan: VecDeque::new(),
             noise,
@@ -97,6 +115,16 @@ impl Vehicle {
         std::iter::once(self.lane).chain(self.plan.iter().copied())
     }
 
+    /// Lanes that its rear has not left, the last one first.
+    pub fn tail(&self, streets: &Streets) -> impl Iterator<Item = LaneId> {
+        let mut rear_m = self.s_m - self.half_m.x;
+        self.behind.iter().copied().take_while(move |lane| {
+            let reaches = rear_m < 0.0;
+            rear_m += streets.lanes[*lane].length_m();
+            reaches
+        })
+    }
+
     pub fn asker(&self) -> Asker {
         Asker { actor: self.id, s_m: self.s_m, half_length_m: self.half_m.x }
     }
@@ -104,10 +132,12 @@ impl Vehicle {
     /// Choose lanes until the way is long enough; at a fork each way is as likely.
     pub fn make_plan(&mut self, streets: &Streets) {
         let mut length_m: f64 = self.way().map(|lane| streets.lanes[lane].length_m()).sum();
-        while length_m - self.s_m < PLAN_M {
+        loop {
             let last = self.plan.back().copied().unwrap_or(self.lane);
+            let enough_m =
+                if streets.lanes[last].is_waiting_place() { PLAN_M } else { LONGEST_PLAN_M };
             let next = &streets.lanes[last].next;
-            if next.is_empty() {
+            if length_m - self.s_m >= enough_m || next.is_empty() {
                 break;
             }
             let next = self.noise.pick(next);

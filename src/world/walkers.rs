@@ -24,8 +24,8 @@ const WIDEST_M: f64 = 30.0;
 /// Time to spare that careful people leave to a vehicle, s.
 const SPARE_S: f64 = 1.5;
 
-/// How far they look for vehicles, m.
-const SIGHT_M: f64 = 60.0;
+/// How far they look for vehicles, m: a wide street takes some 8 s, and vehicles are fast.
+const SIGHT_M: f64 = 200.0;
 
 /// Who steps out without notice, per person and second.
 const JAYWALK_PER_S: f64 = 0.0015;
@@ -144,6 +144,7 @@ impl Walkers {
     pub fn hazards(&self) -> impl Iterator<Item = Hazard> {
         let on_street = |walker: &&Walker| matches!(walker.activity, Activity::Crossing { .. });
         self.walkers.iter().filter(on_street).map(|walker| Hazard {
+            actor: walker.id,
             position_m: walker.position_m,
             velocity_mps: walker.velocity_mps,
             radius_m: walker.kind.half_m().y,
@@ -303,12 +304,15 @@ impl Walker {
         self.facing = left.normalize();
         let next_m = self.position_m + self.facing * step_m;
         // Nobody walks into the side of what stands or passes right before them: what passes is
-        // let by, what stands is walked round, by its nearer end.
+        // let by, from further away the longer it is, since its rear swings out in bends; what
+        // stands is walked round, by its nearer end.
         const ARM_M: f64 = 0.45;
+        const SWING: f64 = 0.15;
         let (here_m, position_m) = (self.position_m, next_m);
         let in_way = |seen: &&Seen| {
             let distance_m = seen.footprint.distance_m(position_m);
-            distance_m < ARM_M && distance_m < seen.footprint.distance_m(here_m)
+            let swing_m = if seen.speed_mps > 0.3 { SWING * seen.footprint.half_m.x } else { 0.0 };
+            distance_m < ARM_M + swing_m && distance_m < seen.footprint.distance_m(here_m)
         };
         let next_m = match vehicles.iter().find(in_way) {
             None => next_m,

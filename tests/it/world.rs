@@ -16,8 +16,8 @@ use pmp::{
         expert::{Expert, ExpertConfig},
         route::Route,
         scoring::Sums,
+        simulation::{SUBSTEPS, Start, World},
         town::Town,
-        world::{SUBSTEPS, Start, World},
     },
 };
 use proptest::prelude::*;

@@ -17,7 +17,7 @@ use crate::{
         occupancy::{Asker, Occupant},
         reservation::ActorId,
         route::Route,
-        snapshot::{Snapshot, VehicleState, WalkerState},
+        snapshot::{Snapshot, VehicleState, vehicle_states, walker_states},
         streets::{LEVEL_M, LaneId, Streets},
         traffic::{EGO, EgoOnLanes, Hazard, STEP_S, Traffic},
         walkers::{Seen, Walkers},
@@ -123,16 +123,7 @@ impl World {
         let announced = self.ego_on_lanes();
         let mut hazards: Vec<Hazard> = self.walkers.hazards().collect();
         hazards.extend(discs(&self.ego, self.ground_m()));
-        let mut seen: Vec<Seen> = self
-            .after
-            .vehicles
-            .iter()
-            .map(|v| Seen {
-                footprint: v.footprint,
-                height_m: v.ground_m,
-                speed_mps: v.velocity_mps.length(),
-            })
-            .collect();
+        let mut seen: Vec<Seen> = self.after.vehicles.iter().map(VehicleState::seen).collect();
         seen.push(Seen {
             footprint: self.ego.footprint(),
             height_m: self.ground_m(),
@@ -147,35 +138,12 @@ impl World {
 
     /// Agents as they are after their last step.
     fn agents(&self, time_s: f64) -> Snapshot {
-        let vehicle = |vehicle: &crate::world::vehicle::Vehicle| {
-            let footprint = vehicle.footprint(&self.streets);
-            VehicleState {
-                id: vehicle.id,
-                kind: vehicle.model.kind,
-                footprint,
-                ground_m: vehicle.spot(&self.streets, 0.0).height_m,
-                height_m: vehicle.height_m,
-                velocity_mps: vehicle.velocity_mps(&footprint),
-                acceleration_mps2: vehicle.acceleration_mps2,
-                colour: vehicle.colour,
-            }
-        };
-        let walker = |walker: &crate::world::walkers::Walker| WalkerState {
-            id: walker.id,
-            kind: walker.kind,
-            footprint: walker.footprint(),
-            ground_m: walker.height_m,
-            velocity_mps: walker.velocity_mps,
-            is_jaywalking: walker.is_jaywalking,
-            is_crossing: walker.is_crossing(),
-            colour: walker.colour,
-        };
         Snapshot {
             time_s,
             ego: self.ego,
             ego_ground_m: self.ground_m(),
-            vehicles: self.traffic.vehicles.iter().map(vehicle).collect(),
-            walkers: self.walkers.walkers.iter().map(walker).collect(),
+            vehicles: vehicle_states(&self.streets, &self.traffic),
+            walkers: walker_states(&self.walkers),
         }
     }
 
@@ -296,13 +264,11 @@ impl World {
             }
         }
         let (way, s_m) = self.route.lanes_ahead(self.progress_m, ANNOUNCED_M);
-        EgoOnLanes {
-            bodies,
-            way,
-            s_m,
-            half_length_m: config.half_length_m,
-            speed_mps: self.ego.speed_mps,
-        }
+        let half_length_m = config.half_length_m;
+        let (mut tail, _) = self.route.lanes_ahead(self.progress_m - half_length_m, half_length_m);
+        tail.retain(|lane| !way.contains(lane));
+        tail.reverse();
+        EgoOnLanes { bodies, way, tail, s_m, half_length_m, speed_mps: self.ego.speed_mps }
     }
 }
 
@@ -311,6 +277,7 @@ fn discs(ego: &Car, height_m: f64) -> [Hazard; 3] {
     let forward = DVec2::from_angle(ego.yaw_rad);
     let velocity_mps = ego.velocity_world_mps();
     [-1.5, 0.0, 1.5].map(|along_m| Hazard {
+        actor: EGO,
         position_m: ego.position_m + forward * along_m,
         velocity_mps,
         radius_m: ego.config.half_width_m,
