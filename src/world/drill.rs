@@ -26,6 +26,9 @@ pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
 /// What a lane change costs the planner, m.
 const LANE_CHANGE_M: f64 = 30.0;
 
+/// Routes that are drawn before a town counts as one without any.
+const ATTEMPTS: u64 = 64;
+
 /// Which drives.
 #[derive(Clone, Debug)]
 pub struct Drill {
@@ -74,9 +77,12 @@ pub fn run(towns: &[Town], drill: &Drill, on: &(dyn Fn(&Drive) + Sync)) -> Vec<D
 fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Drive> {
     // The same routes whatever the traffic, and others in each town and level for all else.
     let planner = Planner::new(&town.map, LANE_CHANGE_M);
-    let draw = drill.seed << 32 | u64::from(episode);
-    let route = MapRoute::random(&planner, draw, drill.lengths_m.clone())?;
-    let route = Arc::new(Route::new(&route, &town.streets)?);
+    let draw = |attempt: u64| {
+        let seed = drill.seed << 32 | u64::from(episode) << 8 | attempt;
+        let route = MapRoute::random(&planner, seed, drill.lengths_m.clone())?;
+        Route::new(&route, &town.streets).filter(|route| !route.strays())
+    };
+    let route = Arc::new((0..ATTEMPTS).find_map(draw)?);
     let stream = episode << 2 | traffic as u32;
     let counts = traffic.draw(&mut Noise::new(drill.seed, stream, Purpose::Scenery));
     let mut world = World::new(Start {

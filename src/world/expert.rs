@@ -13,8 +13,9 @@ use crate::{
         route::{Route, Waypoint},
         simulation::World,
         snapshot::Snapshot,
-        streets::LEVEL_M,
+        streets::{LEVEL_M, LaneId},
         traffic::STEP_S,
+        vehicle::Vehicle,
     },
 };
 
@@ -141,6 +142,7 @@ impl Expert {
         let ahead = [
             self.line_ahead(world, front_m),
             self.body_ahead(world, snapshot),
+            self.change_ahead(world, front_m),
             world.ahead_of_ego(HORIZON_M),
         ];
         for ahead in ahead.into_iter().flatten() {
@@ -191,6 +193,39 @@ impl Expert {
         let line = waypoints.windows(2).find(closed)?;
         let gap_m = line[1].at_m - front_m - LINE_M + self.config.follow.rest_gap_m;
         Some(Ahead::standing(gap_m))
+    }
+
+    /// Where a lane change has to wait for somebody on the lane that it leads into.
+    fn change_ahead(&self, world: &World, front_m: f64) -> Option<Ahead> {
+        const LOOK_M: f64 = 30.0;
+        let at_m = world.progress_m();
+        let changes = world.route.lane_changes();
+        let change = changes.iter().find(|change| change.from_m > at_m - 1.0)?;
+        if change.from_m > at_m + LOOK_M {
+            return None;
+        }
+        let (ego, forward) = (world.ego(), world.route.forward(at_m));
+        let streets = &world.streets;
+        let is_in_way = |vehicle: &&Vehicle| {
+            let comes = |lane: LaneId| {
+                lane == change.into || streets.lanes[lane].next.contains(&change.into)
+            };
+            if !comes(vehicle.lane) && !vehicle.leaving.is_some_and(comes) {
+                return false;
+            }
+            let spot = vehicle.spot(streets, 0.0);
+            let ahead_m = forward.dot(spot.position_m - ego.position_m);
+            let lengths_m = vehicle.half_m.x + ego.config.half_length_m;
+            let closing_mps = vehicle.speed_mps - ego.speed_mps;
+            // Who is behind and stands, or is slow, lets us in.
+            let behind_m = lengths_m + 2.0 + 3.0 * closing_mps.max(0.0);
+            let ahead_limit_m = lengths_m + 1.0;
+            let stands_behind = vehicle.speed_mps < 0.5 && ahead_m < -lengths_m - 0.5;
+            !stands_behind && ahead_m > -behind_m && ahead_m < ahead_limit_m
+        };
+        let waits = world.traffic.vehicles.iter().any(|vehicle| is_in_way(&vehicle));
+        let gap_m = change.from_m - front_m + self.config.follow.rest_gap_m;
+        waits.then(|| Ahead::standing(gap_m.max(0.5)))
     }
 
     /// The nearest vehicle or person whose body will be in the way.

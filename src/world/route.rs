@@ -35,7 +35,22 @@ pub struct Waypoint {
 #[derive(Clone, Debug)]
 pub struct Route {
     waypoints: Vec<Waypoint>,
+    lane_changes: Vec<LaneChange>,
+    strays: bool,
 }
+
+/// A stretch on which the route goes over from one lane to another beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaneChange {
+    /// From the start of the route, m.
+    pub from_m: f64,
+    pub to_m: f64,
+    /// The lane that is changed into.
+    pub into: LaneId,
+}
+
+/// A waypoint further beyond the edge of its lane than this strays, m.
+const EDGE_M: f64 = 0.2;
 
 /// How far back and ahead of the last place the nearest waypoint is looked for, m.
 const BACK_M: f64 = 5.0;
@@ -61,7 +76,25 @@ impl Route {
             }
         };
         let waypoints: Vec<Waypoint> = points.iter().enumerate().map(waypoint).collect();
-        (waypoints.len() > 1).then_some(Route { waypoints })
+        if waypoints.len() < 2 {
+            return None;
+        }
+        let lane_changes = lane_changes(&waypoints, streets);
+        let strays = waypoints.iter().any(|waypoint| {
+            let lane = &streets.lanes[waypoint.lane];
+            lane.course.project(waypoint.position_m).1.abs() > lane.width_m / 2.0 + EDGE_M
+        });
+        Some(Route { waypoints, lane_changes, strays })
+    }
+
+    /// Lane changes, in order.
+    pub fn lane_changes(&self) -> &[LaneChange] {
+        &self.lane_changes
+    }
+
+    /// Whether it leads beside its lanes somewhere: a lane change had no room before a junction.
+    pub fn strays(&self) -> bool {
+        self.strays
     }
 
     pub fn waypoints(&self) -> &[Waypoint] {
@@ -136,6 +169,29 @@ impl Route {
         }
         (lanes, self.waypoints[from].s_m)
     }
+}
+
+/// Stretches around every step from a lane to one beside it, as far as the route is not in the
+/// middle of either.
+fn lane_changes(waypoints: &[Waypoint], streets: &Streets) -> Vec<LaneChange> {
+    const MIDDLE_M: f64 = 0.25;
+    let is_aside = |index: &usize| {
+        let waypoint = &waypoints[*index];
+        let lane = &streets.lanes[waypoint.lane];
+        lane.course.project(waypoint.position_m).1.abs() > MIDDLE_M
+    };
+    let steps = (1..waypoints.len()).filter(|index| {
+        let (before, lane) = (waypoints[index - 1].lane, waypoints[*index].lane);
+        before != lane && !streets.lanes[before].next.contains(&lane)
+    });
+    let change = |index: usize| {
+        let from = (0..index).rev().find(|index| !is_aside(index)).unwrap_or(0);
+        let to = (index..waypoints.len()).find(|index| !is_aside(index));
+        let to = to.unwrap_or(waypoints.len() - 1);
+        let (from_m, to_m) = (waypoints[from].at_m, waypoints[to].at_m);
+        LaneChange { from_m, to_m, into: waypoints[index].lane }
+    };
+    steps.map(change).collect()
 }
 
 /// Curvature from two chords of 2 m, 1/m, without sign.
