@@ -20,6 +20,7 @@ pub mod drops;
 pub mod frame;
 pub mod log;
 pub mod noise;
+pub mod footprint;
 pub mod policy;
 pub mod dataset;
 pub mod map;

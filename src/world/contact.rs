@@ -3,10 +3,12 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{
+use crate::{
     footprint::Footprint,
-    kind::{VehicleKind, WalkerKind},
-    reservation::ActorId,
+    world::{
+        kind::{VehicleKind, WalkerKind},
+        reservation::ActorId,
+    },
 };
 
 /// What the ego vehicle can run into, or be run into by.

@@ -87,7 +87,7 @@ fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Dri
     let counts = traffic.draw(&mut Noise::new(drill.seed, stream, Purpose::Scenery));
     let mut world = World::new(Start {
         streets: town.streets.clone(),
-        obstacles: town.obstacles.clone(),
+        scenery: town.scenery.clone(),
         ego: at_start(&route),
         route,
         counts,

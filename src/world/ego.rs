@@ -6,7 +6,7 @@
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{policy::Action, world::footprint::Footprint};
+use crate::{footprint::Footprint, policy::Action};
 
 /// Step of the vehicle model, s.
 pub const STEP_S: f64 = 0.01;

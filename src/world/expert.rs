@@ -5,11 +5,11 @@
 use glam::DVec2;
 
 use crate::{
+    footprint::Footprint,
     noise::{Noise, Purpose},
     policy::Action,
     world::{
         car_following::{Ahead, Idm},
-        footprint::Footprint,
         route::{Route, Waypoint},
         simulation::World,
         snapshot::Snapshot,

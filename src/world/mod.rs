@@ -10,7 +10,6 @@
 //! own, keyed by (seed, episode, actor), and is visited in the order of its number, so the same
 //! seed gives the same states.
 
-pub mod footprint;
 pub mod ego;
 pub mod car_following;
 pub mod kind;
@@ -28,7 +27,6 @@ pub mod spread;
 pub mod touches;
 pub mod census;
 pub mod rush_hour;
-pub mod obstacles;
 pub mod route;
 pub mod simulation;
 pub mod expert;

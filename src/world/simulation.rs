@@ -5,15 +5,15 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use crate::{
+    footprint::Footprint,
     noise::{Noise, Purpose},
     policy::Action,
+    towns::scenery::collection::Scenery,
     world::{
         car_following::Ahead,
         contact::{Body, Contact, Other, contact},
         density::Counts,
         ego::{self, Car},
-        footprint::Footprint,
-        obstacles::Obstacles,
         occupancy::{Asker, Occupant},
         reservation::ActorId,
         route::Route,
@@ -40,7 +40,7 @@ const ANNOUNCED_M: f64 = 90.0;
 #[derive(Clone, Debug)]
 pub struct Start {
     pub streets: Arc<Streets>,
-    pub obstacles: Arc<Obstacles>,
+    pub scenery: Arc<Scenery>,
     pub route: Arc<Route>,
     pub ego: Car,
     pub counts: Counts,
@@ -55,7 +55,7 @@ pub struct World {
     pub route: Arc<Route>,
     pub traffic: Traffic,
     pub walkers: Walkers,
-    obstacles: Arc<Obstacles>,
+    scenery: Arc<Scenery>,
     ego: Car,
     /// Metres along the route that the ego vehicle has come.
     progress_m: f64,
@@ -69,7 +69,7 @@ pub struct World {
 impl World {
     /// The world of a drive, before its first step.
     pub fn new(start: Start) -> World {
-        let Start { streets, obstacles, route, ego, counts, seed, episode } = start;
+        let Start { streets, scenery, route, ego, counts, seed, episode } = start;
         let mut noise = Noise::new(seed, episode, Purpose::Traffic);
         let actor = |id: ActorId| Noise::of_actor(seed, episode, id);
         let vehicles = counts.vehicles;
@@ -88,7 +88,7 @@ impl World {
             route,
             traffic,
             walkers,
-            obstacles,
+            scenery,
             ego,
             progress_m: 0.0,
             before: empty.clone(),
@@ -234,10 +234,10 @@ impl World {
                 footprint: now(&a.footprint, &b.footprint),
                 velocity_mps: b.velocity_mps,
             });
-        let standing = self.obstacles.touched_by(&footprint).map(|obstacle| Body {
+        let standing = self.scenery.touched_by(&footprint).map(|thing| Body {
             other: Other::Static,
             actor: None,
-            footprint: *obstacle,
+            footprint: thing.footprint,
             velocity_mps: DVec2::ZERO,
         });
         let time_s = self.time_s();

@@ -3,15 +3,17 @@
 use glam::DVec2;
 use sha2::{Digest, Sha256};
 
-use crate::world::{
-    ego::Car,
+use crate::{
     footprint::Footprint,
-    kind::{VehicleKind, WalkerKind},
-    reservation::ActorId,
-    streets::Streets,
-    traffic::Traffic,
-    vehicle::Vehicle,
-    walkers::{Seen, Walker, Walkers},
+    world::{
+        ego::Car,
+        kind::{VehicleKind, WalkerKind},
+        reservation::ActorId,
+        streets::Streets,
+        traffic::Traffic,
+        vehicle::Vehicle,
+        walkers::{Seen, Walker, Walkers},
+    },
 };
 
 /// Brake lamps come on at this, m/s2.

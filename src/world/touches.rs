@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::world::{
+use crate::{
     footprint::Footprint,
-    reservation::ActorId,
-    snapshot::{VehicleState, WalkerState},
-    streets::LEVEL_M,
+    world::{
+        reservation::ActorId,
+        snapshot::{VehicleState, WalkerState},
+        streets::LEVEL_M,
+    },
 };
 
 /// A pair that has been apart for so long touches anew, s.

@@ -6,11 +6,8 @@ use crate::{
     atomic::file_name,
     error::{Error, Result},
     map::{reader, road_map::RoadMap},
-    towns::{
-        catalogue,
-        scenery::{collection::Scenery, things::Thing},
-    },
-    world::{footprint::Footprint, obstacles::Obstacles, paving::pave, streets::Streets},
+    towns::{catalogue, scenery::collection::Scenery},
+    world::{paving::pave, streets::Streets},
 };
 
 /// Scenery is the same in all episodes of a town.
@@ -22,21 +19,15 @@ pub struct Town {
     pub name: String,
     pub map: Arc<RoadMap>,
     pub streets: Arc<Streets>,
-    pub obstacles: Arc<Obstacles>,
+    pub scenery: Arc<Scenery>,
 }
 
 impl Town {
     /// A map with the scenery that it is given.
     pub fn new(name: String, map: RoadMap) -> Town {
         let streets = Arc::new(pave(&map));
-        let scenery = Scenery::derive(&map, SCENERY_SEED);
-        let standing = scenery.things().iter().filter(|thing| thing.kind.is_obstacle());
-        let footprint = |thing: &Thing| {
-            let Thing { footprint, .. } = thing;
-            Footprint::new(footprint.centre_m, footprint.heading_rad, footprint.half_m)
-        };
-        let obstacles = Arc::new(Obstacles::new(standing.map(footprint).collect()));
-        Town { name, map: Arc::new(map), streets, obstacles }
+        let scenery = Arc::new(Scenery::derive(&map, SCENERY_SEED));
+        Town { name, map: Arc::new(map), streets, scenery }
     }
 
     /// Towns by name, all if none is named: the files `NAME.xodr` of a folder, or the package's own.

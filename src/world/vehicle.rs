@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use glam::DVec2;
 
 use crate::{
+    footprint::Footprint,
     noise::Noise,
     world::{
         car_following::Ahead,
-        footprint::Footprint,
         kind::VehicleModel,
         occupancy::Asker,
         reservation::ActorId,

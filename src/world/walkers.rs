@@ -5,9 +5,9 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    footprint::Footprint,
     noise::Noise,
     world::{
-        footprint::Footprint,
         kind::WalkerKind,
         reservation::ActorId,
         streets::{LEVEL_M, Streets, WalkId},

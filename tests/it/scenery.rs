@@ -2,10 +2,11 @@
 
 use glam::DVec2;
 use pmp::{
+    footprint::Footprint,
     map::{opendrive::LaneKind, road_map::RoadMap},
     towns::scenery::{
         collection::Scenery,
-        footprint::{Footprint, hull_m},
+        outline::{hull_m, overlaps},
         things::{Kind, Thing},
     },
 };
@@ -18,7 +19,7 @@ use crate::{
 
 /// Places on a footprint: its corners, and a net over it.
 fn places_m(thing: &Thing) -> Vec<DVec2> {
-    let Footprint { centre_m, half_m, heading_rad } = thing.footprint;
+    let Footprint { centre_m, half_m, forward } = thing.footprint;
     let steps = |half_m: f64| (2.0 * half_m).ceil().max(1.0);
     let (along, across) = (steps(half_m.x), steps(half_m.y));
     let mut places = Vec::new();
@@ -26,7 +27,7 @@ fn places_m(thing: &Thing) -> Vec<DVec2> {
         for j in 0..=across as u32 {
             let share = DVec2::new(f64::from(i) / along, f64::from(j) / across);
             let local = (2.0 * share - 1.0) * half_m;
-            places.push(centre_m + DVec2::from_angle(heading_rad).rotate(local));
+            places.push(centre_m + forward.rotate(local));
         }
     }
     places
@@ -184,17 +185,17 @@ proptest! {
         x in -6.0_f64..6.0, y in -6.0_f64..6.0, a_rad in 0.0_f64..3.0, b_rad in 0.0_f64..3.0,
         half in 0.5_f64..3.0,
     ) {
-        let a = Footprint { centre_m: DVec2::ZERO, half_m: DVec2::new(3.0, 1.0), heading_rad: a_rad };
-        let b = Footprint { centre_m: DVec2::new(x, y), half_m: DVec2::new(half, 1.0), heading_rad: b_rad };
+        let a = Footprint::new(DVec2::ZERO, a_rad, DVec2::new(3.0, 1.0));
+        let b = Footprint::new(DVec2::new(x, y), b_rad, DVec2::new(half, 1.0));
         let net = |footprint: Footprint| {
             places_m(&Thing { kind: Kind::House, footprint, height_m: 1.0, colour: 0 })
         };
         let shares = net(a).iter().any(|place| contains(&b.corners_m(), *place))
             || net(b).iter().any(|place| contains(&a.corners_m(), *place));
-        prop_assert!(!shares || a.overlaps(&b.corners_m()));
-        prop_assert_eq!(a.overlaps(&b.corners_m()), b.overlaps(&a.corners_m()));
+        prop_assert!(!shares || overlaps(&a, &b.corners_m()));
+        prop_assert_eq!(overlaps(&a, &b.corners_m()), overlaps(&b, &a.corners_m()));
         // Circles around both do not meet: nor do the boxes.
         let apart = a.half_m.length() + b.half_m.length();
-        prop_assert!(b.centre_m.length() <= apart || !a.overlaps(&b.corners_m()));
+        prop_assert!(b.centre_m.length() <= apart || !overlaps(&a, &b.corners_m()));
     }
 }

@@ -40,7 +40,7 @@ fn world(town: &Town, seed: u64, counts: Counts) -> World {
     let route = route(town, seed);
     World::new(Start {
         streets: town.streets.clone(),
-        obstacles: town.obstacles.clone(),
+        scenery: town.scenery.clone(),
         ego: at_start(&route),
         route,
         counts,

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::DVec2;
 use rand::RngExt as _;
 
+use crate::footprint::Footprint;
 use crate::towns::scenery::{
-    footprint::Footprint,
     ground::{Clearance, Ground},
     roadside::{Character, Purpose, Roadside},
     things::{Kind, Thing},
@@ -110,9 +110,9 @@ pub fn along(side: &Roadside, seed: u64, ground: &mut Ground, things: &mut Vec<T
 
 fn plot(side: &Roadside, s_m: f64, front_m: f64, depth_m: f64, set_back_m: f64) -> Footprint {
     let middle_m = s_m + 0.5 * front_m;
-    Footprint {
-        centre_m: side.beyond_m(middle_m, set_back_m + 0.5 * depth_m),
-        half_m: 0.5 * DVec2::new(front_m, depth_m),
-        heading_rad: side.heading_rad(middle_m),
-    }
+    Footprint::new(
+        side.beyond_m(middle_m, set_back_m + 0.5 * depth_m),
+        side.heading_rad(middle_m),
+        0.5 * DVec2::new(front_m, depth_m),
+    )
 }

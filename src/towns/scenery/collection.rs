@@ -7,6 +7,7 @@ use rstar::{
 };
 
 use crate::{
+    footprint::Footprint,
     map::road_map::RoadMap,
     towns::scenery::{
         buildings, furniture, ground::Ground, planting, roadside::Roadside, things::Thing,
@@ -41,6 +42,14 @@ impl Scenery {
     /// All things.
     pub fn things(&self) -> &[Thing] {
         &self.things
+    }
+
+    /// The first thing that stops a car and is touched by a footprint.
+    pub fn touched_by(&self, footprint: &Footprint) -> Option<&Thing> {
+        let (low_m, high_m) = footprint.bounds_m();
+        let near = self.within(low_m, high_m).into_iter().map(|index| &self.things[index]);
+        near.into_iter()
+            .find(|thing| thing.kind.is_obstacle() && thing.footprint.touches(footprint))
     }
 
     /// Indices of the things whose bounds come within a box of the map, given by its south-west

@@ -4,12 +4,12 @@ use glam::DVec2;
 use rand::RngExt as _;
 
 use crate::{
+    footprint::Footprint,
     map::{
         opendrive::{LaneKind, Road},
         road_map::RoadMap,
     },
     towns::scenery::{
-        footprint::Footprint,
         ground::{Clearance, Ground, steps_m},
         roadside::{Character, Purpose, Roadside},
         things::{Kind, Thing, square},
@@ -75,11 +75,8 @@ fn add_kerb(road: &Road, section: usize, index: usize, ground: &Ground, things: 
             continue;
         }
         from_m = s_m;
-        let footprint = Footprint {
-            centre_m: 0.5 * (start + end),
-            half_m: 0.5 * DVec2::new(length_m, KERB_WIDTH_M),
-            heading_rad: (end - start).to_angle(),
-        };
+        let half_m = 0.5 * DVec2::new(length_m, KERB_WIDTH_M);
+        let footprint = Footprint::new(0.5 * (start + end), (end - start).to_angle(), half_m);
         let is_there = road.borders(section, index, middle_s_m).width_m() > KERB_WIDTH_M;
         // Edges touch what they bound: a little less must be free.
         let core = Footprint { half_m: 0.5 * footprint.half_m, ..footprint };

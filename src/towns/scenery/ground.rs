@@ -9,11 +9,12 @@ use rstar::{
 };
 
 use crate::{
+    footprint::Footprint,
     map::{
         opendrive::{LaneKind, Road},
         road_map::RoadMap,
     },
-    towns::scenery::footprint::{Footprint, bounds_m, hull_m},
+    towns::scenery::outline::{bounds_m, hull_m, overlaps},
 };
 
 /// Length of the pieces that surfaces are cut into, m.
@@ -93,14 +94,15 @@ impl Ground {
                 Taken::Junction => junctions_m,
                 Taken::Thing => things_m,
             };
-            !footprint.grown(margin_m).overlaps(&surface.outline_m)
+            !overlaps(&footprint.grown(margin_m), &surface.outline_m)
         })
     }
 
     /// Whether cars drive over some of it.
     pub fn is_driven(&self, footprint: &Footprint) -> bool {
-        self.around(footprint)
-            .any(|surface| surface.taken == Taken::Driven && footprint.overlaps(&surface.outline_m))
+        self.around(footprint).any(|surface| {
+            surface.taken == Taken::Driven && overlaps(footprint, &surface.outline_m)
+        })
     }
 
     /// Whether a road lies within `reach_m` of a place, about.

@@ -4,7 +4,7 @@
 //! driven or walked on, nor within a junction. Every stretch of road draws from a stream of
 //! random numbers of its own, so that a road added elsewhere changes nothing here.
 
-pub mod footprint;
+pub mod outline;
 pub mod things;
 pub mod ground;
 pub mod roadside;

@@ -4,8 +4,8 @@ use glam::DVec2;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::footprint::Footprint;
 use crate::towns::scenery::{
-    footprint::Footprint,
     ground::{Clearance, Ground},
     roadside::{Character, Purpose, Roadside},
     things::{Kind, Thing, square},
@@ -38,11 +38,11 @@ pub fn fields(side: &Roadside, seed: u64, ground: &mut Ground, things: &mut Vec<
         let colour = noise.random_range(0..Kind::Field.colours().len()) as u8;
         let height_m = noise.random_range(0.1..0.9);
         let middle_m = s_m + 0.5 * long_m;
-        let footprint = Footprint {
-            centre_m: side.beyond_m(middle_m.min(to_m), 4.0 + 0.5 * deep_m),
-            half_m: 0.5 * DVec2::new(long_m, deep_m),
-            heading_rad: side.heading_rad(middle_m.min(to_m)),
-        };
+        let footprint = Footprint::new(
+            side.beyond_m(middle_m.min(to_m), 4.0 + 0.5 * deep_m),
+            side.heading_rad(middle_m.min(to_m)),
+            0.5 * DVec2::new(long_m, deep_m),
+        );
         if ground.is_free(&footprint, &FIELDS) {
             ground.take(&footprint);
             things.push(Thing { kind: Kind::Field, footprint, height_m, colour });

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::towns::scenery::footprint::Footprint;
+use crate::footprint::Footprint;
 
 /// What a thing is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,5 +81,5 @@ impl Kind {
 
 /// A box at a place, square.
 pub fn square(centre_m: DVec2, heading_rad: f64, side_m: f64) -> Footprint {
-    Footprint { centre_m, half_m: DVec2::splat(0.5 * side_m), heading_rad }
+    Footprint::new(centre_m, heading_rad, DVec2::splat(0.5 * side_m))
 }

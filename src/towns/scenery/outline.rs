@@ -1,40 +1,13 @@
-//! Footprints: boxes on the ground, turned any way.
+//! Convex outlines on the ground: what is driven, walked on or taken.
 
 use glam::DVec2;
 
-/// A box on the ground, map frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Footprint {
-    pub centre_m: DVec2,
-    /// Half of its extent along its heading and across, m.
-    pub half_m: DVec2,
-    /// Anticlockwise from east, rad.
-    pub heading_rad: f64,
-}
+use crate::footprint::Footprint;
 
-impl Footprint {
-    /// Corners, anticlockwise, m.
-    pub fn corners_m(&self) -> [DVec2; 4] {
-        let axis = DVec2::from_angle(self.heading_rad);
-        [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]
-            .map(|signs| self.centre_m + axis.rotate(DVec2::from(signs) * self.half_m))
-    }
-
-    /// The same with `margin_m` around it.
-    pub fn grown(&self, margin_m: f64) -> Footprint {
-        Footprint { half_m: self.half_m + margin_m, ..*self }
-    }
-
-    /// South-west and north-east corner of the box along the axes of the map, m.
-    pub fn bounds_m(&self) -> (DVec2, DVec2) {
-        bounds_m(&self.corners_m())
-    }
-
-    /// Whether it overlaps a convex outline: no axis separates them.
-    pub fn overlaps(&self, outline_m: &[DVec2]) -> bool {
-        let own = self.corners_m();
-        !separates(&own, outline_m) && !separates(outline_m, &own)
-    }
+/// Whether a footprint overlaps a convex outline: no axis separates them.
+pub fn overlaps(footprint: &Footprint, outline_m: &[DVec2]) -> bool {
+    let own = footprint.corners_m();
+    !separates(&own, outline_m) && !separates(outline_m, &own)
 }
 
 /// South-west and north-east corner around points, m.

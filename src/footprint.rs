@@ -1,8 +1,8 @@
-//! What an actor covers of the ground: an oriented rectangle.
+//! What a body covers of the ground: an oriented rectangle.
 
 use glam::DVec2;
 
-/// A rectangle on the ground, world frame.
+/// A rectangle on the ground; frame of the map, which is the world's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     pub centre_m: DVec2,
@@ -32,6 +32,14 @@ impl Footprint {
             centre - along - aside,
             centre + along - aside,
         ]
+    }
+
+    /// South-west and north-east corner of the box along the axes of the map, m.
+    pub fn bounds_m(&self) -> (DVec2, DVec2) {
+        let corners = self.corners_m();
+        let low = corners.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+        let high = corners.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+        (low, high)
     }
 
     /// Half of the diagonal, m: nothing further from the centre is touched.
