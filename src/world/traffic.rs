@@ -231,7 +231,7 @@ impl Traffic {
                 });
             }
             let may_go = |lanes: &[LaneId]| {
-                self.is_at_the_head(way, lanes) && self.has_room(streets, way, lanes)
+                self.is_at_the_head(streets, way, lanes) && self.has_room(streets, way, lanes)
             };
             let updates: Vec<(usize, (usize, f64), bool)> = self
                 .reservations
@@ -256,10 +256,13 @@ impl Traffic {
 
     /// Whether all who are between an actor and its junction may enter themselves: a way that is
     /// taken by somebody who cannot move would be lost to all.
-    fn is_at_the_head(&self, way: &Way, through: &[LaneId]) -> bool {
+    fn is_at_the_head(&self, streets: &Streets, way: &Way, through: &[LaneId]) -> bool {
         let before = way.lanes.iter().take_while(|lane| Some(*lane) != through.first());
+        let Some(approach) = before.clone().last() else { return true };
+        let leads_in = |lane: &LaneId| streets.lanes[*approach].next.contains(lane);
         let has_way = |actor: ActorId| {
-            self.reservations.claims().iter().any(|claim| claim.actor == actor && claim.is_taken)
+            let mut claims = self.reservations.claims().iter();
+            claims.any(|c| c.actor == actor && c.is_taken && c.lanes.iter().any(leads_in))
         };
         before.enumerate().all(|(index, lane)| {
             let from_m = if index == 0 { way.s_m } else { f64::NEG_INFINITY };
