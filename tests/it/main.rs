@@ -52,6 +52,7 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod encoding;
+mod flow;
 mod recording;
 #[cfg(feature = "learning")]
 mod stats;
