@@ -60,6 +60,7 @@ def pmp(binary, town, vehicles, walkers, minutes, seed=0):
 def sumo_run(town, vehicles, minutes, folder):
     net, trips = folder / f"{town.stem}.net.xml", folder / f"{town.stem}.trips.xml"
     summary, types = folder / f"{town.stem}.summary.xml", folder / "types.add.xml"
+    collisions = folder / f"{town.stem}.collisions.xml"
     types.write_text(f"<additional>{CAR}</additional>")
     convert = [PROGRAMS / "netconvert", "--opendrive-files", town, "-o", net, "--no-warnings"]
     run([*convert, "--tls.discard-loaded", "--ignore-errors"])
@@ -70,10 +71,12 @@ def sumo_run(town, vehicles, minutes, folder):
     command = [PROGRAMS / "sumo", "-n", net, "-r", trips, "-a", types, "--no-warnings", "--no-step-log"]
     cpu, _ = run([*command, "--step-length", STEP_S, "--end", 60 * minutes, "--max-num-vehicles", vehicles,
                   "--max-depart-delay", 30, "--time-to-teleport", 300, "--collision.action", "warn",
-                  "--collision.check-junctions", "--summary-output", summary, "--seed", 0])
+                  "--collision.check-junctions", "--collision-output", collisions, "--summary-output", summary, "--seed", 0])
     # The first minute fills the streets.
     steps = [step.attrib for _, step in ElementTree.iterparse(summary) if step.tag == "step"]
     steps = [step for step in steps if float(step["time"]) > 60 and int(step["running"]) > 0]
+    # One that lasts is told again at each step.
+    met = {frozenset([c.get("collider"), c.get("victim")]) for c in ElementTree.parse(collisions).iter("collision")}
     running = [int(step["running"]) for step in steps]
     metres = sum(float(step["meanSpeed"]) * int(step["running"]) * STEP_S for step in steps)
     return {
@@ -81,7 +84,7 @@ def sumo_run(town, vehicles, minutes, folder):
         "km": metres / 1000,
         "speed": metres / (sum(running) * STEP_S),
         "stopped": sum(int(step["halting"]) for step in steps) / sum(running),
-        "collisions": int(steps[-1]["collisions"]),
+        "collisions": len(met),
         "jammed": int(steps[-1]["teleports"]),
         "cpu": cpu,
     }

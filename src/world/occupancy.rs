@@ -131,7 +131,7 @@ impl Occupancy {
         }
         let last = |before: &LaneId| {
             let length_m = streets.lanes[*before].length_m();
-            let body = self.by_lane[*before].iter().filter(others).last()?;
+            let body = self.by_lane[*before].iter().rev().find(others)?;
             Some((asker.s_m + length_m - body.s_m, body))
         };
         let behind = streets.lanes[lane].previous.iter().filter_map(last);

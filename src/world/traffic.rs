@@ -242,8 +242,8 @@ impl Traffic {
         for vehicle in &mut self.vehicles {
             let waits =
                 |claim: &Claim| claim.actor == vehicle.id && !claim.is_taken && !claim.has_room;
-            let for_long = vehicle.standing_s > PATIENCE_S
-                && (vehicle.standing_s / STEP_S).round() as u64 % (PATIENCE_S / STEP_S) as u64 == 0;
+            let stood = (vehicle.standing_s / STEP_S).round() as u64;
+            let for_long = stood > 0 && stood.is_multiple_of((PATIENCE_S / STEP_S) as u64);
             if for_long && self.reservations.claims().iter().any(waits) {
                 self.reservations.forget(vehicle.id, |_| false);
                 vehicle.plan_anew(streets);
@@ -255,7 +255,7 @@ impl Traffic {
         for index in 0..self.vehicles.len() {
             let vehicle = &self.vehicles[index];
             // Once a second, not all in the same step.
-            if (self.steps + u64::from(vehicle.id)) % 10 != 0 || vehicle.leaving.is_some() {
+            if !(self.steps + u64::from(vehicle.id)).is_multiple_of(10) || vehicle.leaving.is_some() {
                 continue;
             }
             if let Some(to) = better_lane(&self.occupancy, streets, vehicle) {
