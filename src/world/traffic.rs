@@ -255,7 +255,8 @@ impl Traffic {
         for index in 0..self.vehicles.len() {
             let vehicle = &self.vehicles[index];
             // Once a second, not all in the same step.
-            if !(self.steps + u64::from(vehicle.id)).is_multiple_of(10) || vehicle.leaving.is_some() {
+            if !(self.steps + u64::from(vehicle.id)).is_multiple_of(10) || vehicle.leaving.is_some()
+            {
                 continue;
             }
             if let Some(to) = better_lane(&self.occupancy, streets, vehicle) {
