@@ -2,13 +2,10 @@
 
 use crate::world::{
     car_following::{Ahead, Change, Idm, MOBIL},
-    occupancy::{Asker, Occupancy},
+    occupancy::{Asker, HORIZON_M, Occupancy},
     streets::{LaneId, Streets},
     vehicle::{ASIDE_MPS, ASIDE_PER_SPEED, Vehicle},
 };
-
-/// How far ahead drivers look, m.
-const HORIZON_M: f64 = 120.0;
 
 /// How the one behind is taken to follow, when a lane is changed.
 const FOLLOWER: Idm =

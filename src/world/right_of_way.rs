@@ -6,7 +6,7 @@
 use crate::world::{
     car_following::Ahead,
     kind::REST_GAP_M,
-    occupancy::{Asker, Occupancy, Occupant},
+    occupancy::{Asker, HORIZON_M, Occupancy, Occupant},
     reservation::{ActorId, Claim, Reservations},
     streets::{LaneId, Streets},
 };
@@ -20,9 +20,6 @@ const WIDE_M: f64 = 3.2;
 
 /// Least room behind a junction, beyond the own length, m.
 const ROOM_M: f64 = 3.0;
-
-/// Room behind a junction is looked for so far, m.
-const HORIZON_M: f64 = 120.0;
 
 /// An actor on its way to a junction.
 pub struct Way {

@@ -7,7 +7,7 @@ use crate::{
     world::{
         car_following::Ahead,
         lane_change::better_lane,
-        occupancy::{Asker, Occupancy, Occupant},
+        occupancy::{Asker, HORIZON_M, Occupancy, Occupant},
         reservation::{ActorId, Claim, Reservations},
         right_of_way::{self, ASK_M, Way},
         streets::{LEVEL_M, LaneId, Streets},
@@ -20,9 +20,6 @@ pub const STEP_S: f64 = 0.1;
 
 /// The ego vehicle's number.
 pub const EGO: ActorId = 0;
-
-/// How far ahead drivers look, m.
-const HORIZON_M: f64 = 120.0;
 
 /// Full braking, m/s2.
 const HARDEST_MPS2: f64 = 7.5;
