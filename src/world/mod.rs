@@ -18,6 +18,8 @@ pub mod paving;
 pub mod reservation;
 pub mod occupancy;
 pub mod vehicle;
+pub mod right_of_way;
+pub mod lane_change;
 pub mod traffic;
 pub mod walkers;
 pub mod contact;

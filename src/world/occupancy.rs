@@ -6,6 +6,9 @@ use crate::world::{
     streets::{LaneId, Streets},
 };
 
+/// How far ahead drivers look, m.
+pub const HORIZON_M: f64 = 120.0;
+
 /// A body on a lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Occupant {

@@ -5,12 +5,13 @@ use glam::DVec2;
 use crate::{
     noise::Noise,
     world::{
-        car_following::{Ahead, Change, Idm, MOBIL},
-        kind::REST_GAP_M,
-        occupancy::{Asker, Occupancy, Occupant},
+        car_following::Ahead,
+        lane_change::better_lane,
+        occupancy::{Asker, HORIZON_M, Occupancy, Occupant},
         reservation::{ActorId, Claim, Reservations},
+        right_of_way::{self, ASK_M, Way},
         streets::{LEVEL_M, LaneId, Streets},
-        vehicle::{ASIDE_MPS, ASIDE_PER_SPEED, Vehicle, View},
+        vehicle::{Vehicle, View},
     },
 };
 
@@ -20,24 +21,11 @@ pub const STEP_S: f64 = 0.1;
 /// The ego vehicle's number.
 pub const EGO: ActorId = 0;
 
-/// How far ahead drivers look, m.
-const HORIZON_M: f64 = 120.0;
-
 /// Full braking, m/s2.
 const HARDEST_MPS2: f64 = 7.5;
 
 /// Where vehicles stop before a junction, m from its edge.
 const LINE_M: f64 = 0.5;
-
-/// A claim is asked for at this distance from the junction at the latest, and where braking to the
-/// line would still be comfortable, m.
-const ASK_M: f64 = 20.0;
-
-/// Longer than twice this, a vehicle needs more room in bends than cars do, m.
-const WIDE_M: f64 = 3.2;
-
-/// Least room behind a junction, beyond the own length, m.
-const ROOM_M: f64 = 3.0;
 
 /// How long drivers wait for room before they think of another way, s.
 const PATIENCE_S: f64 = 12.0;
@@ -133,7 +121,7 @@ impl Traffic {
         self.steps += 1;
         let ways = self.ways(streets, ego);
         self.place_bodies(streets, ego, &ways);
-        self.settle_claims(streets, &ways);
+        right_of_way::settle(&mut self.reservations, &self.occupancy, streets, &ways, self.steps);
         let views: Vec<View> =
             self.vehicles.iter().map(|vehicle| self.view(streets, vehicle, hazards)).collect();
         for (vehicle, view) in self.vehicles.iter_mut().zip(views) {
@@ -208,93 +196,6 @@ impl Traffic {
         self.vehicles.iter().map(way).chain(ego).collect()
     }
 
-    fn settle_claims(&mut self, streets: &Streets, ways: &[Way]) {
-        for way in ways {
-            let through = way.through(streets);
-            self.reservations.forget(way.actor, |claim| {
-                let is_next = through.as_ref().is_some_and(|(lanes, _)| claim.lanes[0] == lanes[0]);
-                is_next || way.is_on(&claim.lanes)
-            });
-            if let Some((lanes, distance_m)) = through
-                && distance_m < way.ask_m
-            {
-                self.reservations.ask(Claim {
-                    actor: way.actor,
-                    lanes,
-                    since: self.steps,
-                    is_taken: distance_m <= 0.0,
-                    has_room: false,
-                    is_wide: way.half_length_m > WIDE_M,
-                    length_m: 2.0 * way.half_length_m,
-                    speed_mps: way.speed_mps,
-                    rear: (0, 0.0),
-                });
-            }
-            let may_go = |lanes: &[LaneId]| {
-                self.is_at_the_head(way, lanes) && self.has_room(streets, way, lanes)
-            };
-            let updates: Vec<(usize, (usize, f64), bool)> = self
-                .reservations
-                .claims()
-                .iter()
-                .enumerate()
-                .filter(|(_, claim)| claim.actor == way.actor)
-                .map(|(index, claim)| {
-                    let rear = way.rear_among(&claim.lanes, streets);
-                    (index, rear, claim.is_taken || may_go(&claim.lanes))
-                })
-                .collect();
-            for (index, rear, has_room) in updates {
-                let claim: &mut Claim = &mut self.reservations.claims_mut()[index];
-                claim.rear = rear;
-                claim.speed_mps = way.speed_mps;
-                claim.has_room = has_room;
-            }
-        }
-        self.reservations.settle(streets);
-    }
-
-    /// Whether all who are between an actor and its junction may enter themselves: a way that is
-    /// taken by somebody who cannot move would be lost to all.
-    fn is_at_the_head(&self, way: &Way, through: &[LaneId]) -> bool {
-        let before = way.lanes.iter().take_while(|lane| Some(*lane) != through.first());
-        let has_way = |actor: ActorId| {
-            self.reservations.claims().iter().any(|claim| claim.actor == actor && claim.is_taken)
-        };
-        before.enumerate().all(|(index, lane)| {
-            let from_m = if index == 0 { way.s_m } else { f64::NEG_INFINITY };
-            let mut ahead = self.occupancy.on(*lane).iter().filter(|body| body.s_m > from_m);
-            ahead.all(|body| body.actor == way.actor || has_way(body.actor))
-        })
-    }
-
-    /// Whether a vehicle could stand behind the junction, with all who are on their way there: now,
-    /// and when all of them queue at the next one.
-    fn has_room(&self, streets: &Streets, way: &Way, through: &[LaneId]) -> bool {
-        let Some(last) = through.last() else { return true };
-        let Some(at) = way.lanes.iter().position(|lane| lane == last) else { return true };
-        let beyond = &way.lanes[at + 1..];
-        let Some(exit) = beyond.first() else { return true };
-        let on_their_way = self.reservations.claims().iter().filter(|claim| {
-            claim.is_taken
-                && claim.actor != way.actor
-                && claim.lanes.last().is_some_and(|lane| streets.lanes[*lane].next.contains(exit))
-        });
-        let theirs_m: f64 = on_their_way.map(|claim| claim.length_m + REST_GAP_M).sum();
-        let needed_m = 2.0 * way.half_length_m + ROOM_M + theirs_m;
-
-        let asker = Asker { actor: way.actor, s_m: 0.0, half_length_m: 0.0 };
-        let ahead = self.occupancy.ahead(streets, beyond.iter().copied(), asker, HORIZON_M);
-        // Who moves on will have made room.
-        let has_now = |ahead: Ahead| ahead.gap_m + 3.0 * ahead.speed_mps > needed_m;
-        let queue = || beyond.iter().take_while(|lane| streets.lanes[**lane].junction.is_none());
-        let length_m: f64 = queue().map(|lane| streets.lanes[*lane].length_m()).sum();
-        let bodies = queue().flat_map(|lane| self.occupancy.on(*lane));
-        let others = bodies.filter(|body| body.actor != way.actor);
-        let taken_m: f64 = others.map(|body| 2.0 * body.half_length_m + REST_GAP_M).sum();
-        ahead.is_none_or(has_now) && length_m - taken_m > needed_m
-    }
-
     /// What a driver sees, and makes of it.
     fn view(&self, streets: &Streets, vehicle: &Vehicle, hazards: &[Hazard]) -> View {
         let idm = vehicle.model.idm();
@@ -338,9 +239,8 @@ impl Traffic {
         for vehicle in &mut self.vehicles {
             let waits =
                 |claim: &Claim| claim.actor == vehicle.id && !claim.is_taken && !claim.has_room;
-            let for_long = vehicle.standing_s > PATIENCE_S
-                && ((vehicle.standing_s / STEP_S).round() as u64)
-                    .is_multiple_of((PATIENCE_S / STEP_S) as u64);
+            let stood = (vehicle.standing_s / STEP_S).round() as u64;
+            let for_long = stood > 0 && stood.is_multiple_of((PATIENCE_S / STEP_S) as u64);
             if for_long && self.reservations.claims().iter().any(waits) {
                 self.reservations.forget(vehicle.id, |_| false);
                 vehicle.plan_anew(streets);
@@ -356,141 +256,12 @@ impl Traffic {
             {
                 continue;
             }
-            if let Some(to) = self.better_lane(streets, vehicle) {
+            if let Some(to) = better_lane(&self.occupancy, streets, vehicle) {
                 let vehicle = &mut self.vehicles[index];
                 vehicle.change_lane(streets, to);
                 self.occupancy.insert(to, body_of(vehicle));
             }
         }
-    }
-
-    /// A neighbouring lane that is worth a change.
-    fn better_lane(&self, streets: &Streets, vehicle: &Vehicle) -> Option<LaneId> {
-        let lane = &streets.lanes[vehicle.lane];
-        let left_m = lane.length_m() - vehicle.s_m;
-        if lane.junction.is_some() || vehicle.s_m < 8.0 || vehicle.speed_mps < 2.0 {
-            return None;
-        }
-        let leads_nowhere = lane.next.is_empty();
-        // Not right before a junction, unless the lane ends there.
-        if !leads_nowhere && left_m < 25.0 + 2.0 * vehicle.speed_mps {
-            return None;
-        }
-        let bias = if leads_nowhere { 4.0 * (1.0 - left_m / 150.0).clamp(0.0, 1.0) } else { 0.0 };
-        let idm = vehicle.model.idm();
-        let wish = wish_mps(streets, vehicle);
-        let own = |way: &mut dyn Iterator<Item = LaneId>, asker| {
-            let ahead = self.occupancy.ahead(streets, way, asker, HORIZON_M);
-            idm.acceleration_mps2(vehicle.speed_mps, wish, ahead)
-        };
-        let ahead = self.occupancy.ahead(streets, vehicle.way(), vehicle.asker(), HORIZON_M);
-        let before = idm.acceleration_mps2(vehicle.speed_mps, wish, ahead);
-        if ahead.is_some_and(|ahead| !comes_clear_of(vehicle, lane.width_m, ahead)) {
-            return None;
-        }
-        let is_wanted = |to: &LaneId| {
-            let target = &streets.lanes[*to];
-            let asker = Asker { s_m: lane.beside_m(vehicle.s_m, target), ..vehicle.asker() };
-            let mut way = std::iter::once(*to).chain(target.next.first().copied());
-            let after = own(&mut way, asker);
-            let follower = self.occupancy.behind(streets, *to, asker, 60.0);
-            // The manners of others are not known: those of cars are assumed.
-            let theirs = follower.map(|(distance_m, body)| {
-                let gap_m = distance_m - body.half_length_m - vehicle.half_m.x;
-                let squeezed = Ahead { gap_m, speed_mps: vehicle.speed_mps };
-                let follow =
-                    |ahead| FOLLOWER.acceleration_mps2(body.speed_mps, target.limit_mps, ahead);
-                [follow(None), follow(Some(squeezed))]
-            });
-            let change = Change {
-                own_before_mps2: before,
-                own_after_mps2: after,
-                follower_mps2: theirs,
-                old_follower_mps2: None,
-            };
-            let room = follower.is_none_or(|(distance_m, body)| {
-                distance_m > body.half_length_m + vehicle.half_m.x + 1.5
-            });
-            room && MOBIL.wants(&change, bias)
-        };
-        let leads_on = |to: &LaneId| !leads_nowhere || !streets.lanes[*to].next.is_empty();
-        [lane.left, lane.right].into_iter().flatten().filter(leads_on).find(is_wanted)
-    }
-}
-
-/// Whether a vehicle is out of its lane before it reaches who is ahead there, if it changes now.
-fn comes_clear_of(vehicle: &Vehicle, width_m: f64, ahead: Ahead) -> bool {
-    /// It may speed up so much meanwhile, as a share of its speed.
-    const FASTER: f64 = 1.25;
-    let speed_mps = vehicle.speed_mps;
-    // Bodies in the middle of their lanes are clear of each other when one is half a lane aside
-    // and half its own width.
-    let aside_m = width_m / 2.0 + vehicle.half_m.y;
-    let clear_s = aside_m / ASIDE_MPS.min(ASIDE_PER_SPEED * speed_mps);
-    ahead.gap_m > (FASTER * speed_mps - ahead.speed_mps).max(0.0) * clear_s + 1.0
-}
-
-/// How the one behind is taken to follow, when a lane is changed.
-const FOLLOWER: Idm =
-    Idm { acceleration_mps2: 1.5, comfort_mps2: 2.0, time_gap_s: 1.2, rest_gap_m: 2.0 };
-
-/// An actor on its way to a junction.
-struct Way {
-    actor: ActorId,
-    lanes: Vec<LaneId>,
-    s_m: f64,
-    half_length_m: f64,
-    speed_mps: f64,
-    /// Lanes that its rear has not left, the last one first.
-    tail: Vec<LaneId>,
-    /// From where on it asks, m before the junction.
-    ask_m: f64,
-}
-
-impl Way {
-    fn body(&self) -> Occupant {
-        let Way { actor, s_m, half_length_m, speed_mps, .. } = *self;
-        Occupant { actor, s_m, half_length_m, speed_mps }
-    }
-
-    /// Whether any part of the body is on one of `lanes`.
-    fn is_on(&self, lanes: &[LaneId]) -> bool {
-        lanes.contains(&self.lanes[0]) || self.tail.iter().any(|lane| lanes.contains(lane))
-    }
-
-    /// Which of `lanes` the rear is on, and its arc length there, m; the first and a negative one
-    /// if it has yet to come there.
-    fn rear_among(&self, lanes: &[LaneId], streets: &Streets) -> (usize, f64) {
-        let mut rear_m = self.s_m - self.half_length_m;
-        let mut at = self.lanes[0];
-        for lane in &self.tail {
-            at = *lane;
-            rear_m += streets.lanes[at].length_m();
-        }
-        if let Some(index) = lanes.iter().position(|lane| *lane == at) {
-            return (index, rear_m);
-        }
-        let before = self.lanes.iter().take_while(|lane| Some(*lane) != lanes.first());
-        let to_first_m: f64 = before.map(|lane| streets.lanes[*lane].length_m()).sum();
-        (0, self.s_m - self.half_length_m - to_first_m)
-    }
-
-    /// The lanes through the next junction, and on to where there is room to stand between two
-    /// junctions; and the distance of the front from the first of them, m.
-    fn through(&self, streets: &Streets) -> Option<(Vec<LaneId>, f64)> {
-        let is_inside = |lane: &LaneId| streets.lanes[*lane].junction.is_some();
-        let first = self.lanes.iter().position(is_inside)?;
-        let before = self.lanes[..first].iter().map(|lane| streets.lanes[*lane].length_m());
-        let distance_m = before.sum::<f64>() - self.s_m - self.half_length_m;
-        let mut lanes: Vec<LaneId> = self.lanes[first..]
-            .iter()
-            .take_while(|lane| !streets.lanes[**lane].is_waiting_place())
-            .copied()
-            .collect();
-        while lanes.last().is_some_and(|lane| !is_inside(lane)) {
-            lanes.pop();
-        }
-        Some((lanes, distance_m))
     }
 }
 
@@ -579,10 +350,7 @@ mod tests {
     use super::*;
     use crate::{
         noise::Purpose,
-        world::{
-            kind::VEHICLES,
-            streets::{Course, Lane},
-        },
+        world::streets::{Course, Lane},
     };
 
     const RING_M: f64 = 1000.0;
@@ -603,42 +371,6 @@ mod tests {
             lane
         };
         Streets::new((0..4).map(lane).collect(), Vec::new())
-    }
-
-    /// The same cars on a ring end up at the speed at which the model's gap of steady traffic is
-    /// the one that they have.
-    #[test]
-    fn cars_on_a_ring_settle_at_the_speed_of_the_models_own_theory() {
-        let streets = ring();
-        for cars in [20, 40, 60] {
-            let actor = |id| Noise::of_actor(1, 0, id);
-            let mut traffic = Traffic::default();
-            for index in 0..cars {
-                let s_m = RING_M * index as f64 / cars as f64;
-                let (lane, id) = ((s_m / 250.0) as usize, 1 + index as ActorId);
-                let mut vehicle = Vehicle::new(id, actor(id), &streets, lane, s_m % 250.0);
-                (vehicle.model, vehicle.half_m) = (&VEHICLES[0], VEHICLES[0].half_m);
-                (vehicle.haste, vehicle.aside_m, vehicle.keeps_aside_m) = (1.0, 0.0, 0.0);
-                // A jolt, which has to fade.
-                vehicle.speed_mps = if index % 5 == 0 { 2.0 } else { 6.0 };
-                traffic.vehicles.push(vehicle);
-            }
-            for _ in 0..6000 {
-                traffic.step(&streets, None, &[]);
-            }
-            let gap_m = RING_M / cars as f64 - 2.0 * VEHICLES[0].half_m.x;
-            let idm = VEHICLES[0].idm();
-            let (mut low, mut high) = (0.0, LIMIT_MPS);
-            for _ in 0..60 {
-                let middle = (low + high) / 2.0;
-                let is_low = idm.steady_gap_m(middle, LIMIT_MPS) < gap_m;
-                (low, high) = if is_low { (middle, high) } else { (low, middle) };
-            }
-            for vehicle in &traffic.vehicles {
-                let off = (vehicle.speed_mps - low).abs();
-                assert!(off < 0.02 * low, "{cars} cars: {} and not {low}", vehicle.speed_mps);
-            }
-        }
     }
 
     #[test]

@@ -55,6 +55,7 @@ mod world;
 mod encoding;
 mod towns;
 mod scenery;
+mod flow;
 mod recording;
 mod map_fixtures;
 mod map_geometry;
