@@ -14,11 +14,13 @@ const FOLLOWER: Idm =
 /// A neighbouring lane that is worth a change.
 pub fn better_lane(occupancy: &Occupancy, streets: &Streets, vehicle: &Vehicle) -> Option<LaneId> {
     let lane = &streets.lanes[vehicle.lane];
-    let left_m = lane.length_m() - vehicle.s_m;
-    if lane.junction.is_some() || vehicle.s_m < 8.0 || vehicle.speed_mps < 2.0 {
+    let left_m = lane.dead_end_m.unwrap_or(lane.length_m()) - vehicle.s_m;
+    let leads_nowhere = lane.dead_end_m.is_some();
+    // Who stands at the end of a lane has to get out of it; others change on the move.
+    let is_too_early = vehicle.s_m < 8.0 || vehicle.speed_mps < 2.0;
+    if lane.junction.is_some() || is_too_early && !leads_nowhere {
         return None;
     }
-    let leads_nowhere = lane.next.is_empty();
     // Not right before a junction, unless the lane ends there.
     if !leads_nowhere && left_m < 25.0 + 2.0 * vehicle.speed_mps {
         return None;
@@ -40,7 +42,7 @@ pub fn better_lane(occupancy: &Occupancy, streets: &Streets, vehicle: &Vehicle) 
         let asker = Asker { s_m: lane.beside_m(vehicle.s_m, target), ..vehicle.asker() };
         let mut way = std::iter::once(*to).chain(target.next.first().copied());
         let after = own(&mut way, asker);
-        let follower = occupancy.behind(streets, *to, asker, 60.0);
+        let follower = occupancy.behind(streets, *to, asker, HORIZON_M);
         // The manners of others are not known: those of cars are assumed.
         let theirs = follower.map(|(distance_m, body)| {
             let gap_m = distance_m - body.half_length_m - vehicle.half_m.x;
@@ -60,7 +62,7 @@ pub fn better_lane(occupancy: &Occupancy, streets: &Streets, vehicle: &Vehicle) 
         });
         room && MOBIL.wants(&change, bias)
     };
-    let leads_on = |to: &LaneId| !leads_nowhere || !streets.lanes[*to].next.is_empty();
+    let leads_on = |to: &LaneId| streets.lanes[*to].dead_end_m.is_none();
     [lane.left, lane.right].into_iter().flatten().filter(leads_on).find(is_wanted)
 }
 
@@ -69,9 +71,13 @@ fn comes_clear_of(vehicle: &Vehicle, width_m: f64, ahead: Ahead) -> bool {
     /// It may speed up so much meanwhile, as a share of its speed.
     const FASTER: f64 = 1.25;
     let speed_mps = vehicle.speed_mps;
+    let closing_mps = (FASTER * speed_mps - ahead.speed_mps).max(0.0);
+    if closing_mps == 0.0 {
+        return ahead.gap_m > 1.0;
+    }
     // Bodies in the middle of their lanes are clear of each other when one is half a lane aside
     // and half its own width.
     let aside_m = width_m / 2.0 + vehicle.half_m.y;
     let clear_s = aside_m / ASIDE_MPS.min(ASIDE_PER_SPEED * speed_mps);
-    ahead.gap_m > (FASTER * speed_mps - ahead.speed_mps).max(0.0) * clear_s + 1.0
+    ahead.gap_m > closing_mps * clear_s + 1.0
 }

@@ -43,6 +43,9 @@ pub fn pave(map: &RoadMap) -> Streets {
         let lane = &mut lanes[id];
         lane.junction = junction;
         lane.next = graph_lane.successors.clone();
+        if lane.next.is_empty() {
+            lane.usable_m = usable_m(map, id, lane.length_m());
+        }
         lane.left = graph_lane.left.filter(|_| graph_lane.may_change_left);
         lane.right = graph_lane.right.filter(|_| graph_lane.may_change_right);
     }
@@ -58,6 +61,18 @@ fn lane(map: &RoadMap, id: usize) -> Lane {
     let limit_mps = map.road(id).speed_limit_mps(key.section, key.lane, middle_m);
     let width_m = map.centre(id, middle_m).width_m;
     Lane::new(map.name(id), Course::through(&points), width_m, limit_mps.unwrap_or(LIMIT_MPS))
+}
+
+/// How far along a lane that narrows to nothing a vehicle can stand beside others, m.
+fn usable_m(map: &RoadMap, id: usize, length_m: f64) -> f64 {
+    const WIDE_M: f64 = 2.8;
+    let lane = map.lane(id);
+    let s_m = |along_m: f64| lane.entry_m() + (lane.exit_m() - lane.entry_m()) * along_m / length_m;
+    let steps = (length_m / STEP_M) as usize;
+    let is_narrow = |step: &usize| map.centre(id, s_m(*step as f64 * STEP_M)).width_m < WIDE_M;
+    // From the end backwards: it may begin narrow as well.
+    let narrow = (0..=steps).rev().take_while(is_narrow).last();
+    narrow.map_or(length_m, |step| step as f64 * STEP_M)
 }
 
 /// Points from one `s` to another, a [`STEP_M`] apart or less.

@@ -109,6 +109,10 @@ pub struct Lane {
     pub name: String,
     pub course: Course,
     pub width_m: f64,
+    /// Up to here it is wide enough for a vehicle; its length, unless it narrows to nothing, m.
+    pub usable_m: f64,
+    /// From its start to where it ends for good, straight ahead, m; `None` where it leads on.
+    pub dead_end_m: Option<f64>,
     pub limit_mps: f64,
     /// Index in [`Streets::junctions`], for a lane that leads through one.
     pub junction: Option<usize>,
@@ -126,6 +130,8 @@ impl Lane {
         let curvature_per_m = curvature(&course);
         Lane {
             name,
+            usable_m: course.length_m(),
+            dead_end_m: None,
             course,
             width_m,
             limit_mps,
@@ -250,6 +256,7 @@ impl Streets {
                 junctions[junction].lanes.push(id);
             }
         }
+        find_dead_ends(&mut lanes);
         let mut streets = Streets {
             conflicts: vec![Vec::new(); lanes.len()],
             siblings: vec![Vec::new(); lanes.len()],
@@ -347,6 +354,25 @@ impl Streets {
             let inside = s_m > 0.0 && s_m < lane.length_m();
             inside && aside_m.abs() < lane.width_m / 2.0 + margin_m
         })
+    }
+}
+
+/// Mark lanes that lead nowhere, and those that lead into such alone.
+fn find_dead_ends(lanes: &mut [Lane]) {
+    for lane in lanes.iter_mut().filter(|lane| lane.next.is_empty()) {
+        lane.dead_end_m = Some(lane.usable_m);
+    }
+    // A lane that drops is a few sections long.
+    const SECTIONS: usize = 8;
+    for _ in 0..SECTIONS {
+        for id in 0..lanes.len() {
+            let beyond = lanes[id].next.iter().map(|next| lanes[*next].dead_end_m);
+            let nearest = beyond.collect::<Option<Vec<f64>>>();
+            let nearest = nearest.and_then(|ends| ends.into_iter().reduce(f64::min));
+            if let Some(end_m) = nearest {
+                lanes[id].dead_end_m = Some(lanes[id].length_m() + end_m);
+            }
+        }
     }
 }
 

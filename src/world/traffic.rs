@@ -230,8 +230,10 @@ impl Traffic {
         }
         // The end of a lane that leads nowhere.
         let last = vehicle.way().last()?;
-        (start_m < HORIZON_M && streets.lanes[last].next.is_empty())
-            .then(|| Ahead::standing(start_m - vehicle.half_m.x))
+        let lane = &streets.lanes[last];
+        let end_m = start_m - (lane.length_m() - lane.usable_m);
+        (start_m < HORIZON_M && lane.next.is_empty())
+            .then(|| Ahead::standing(end_m - vehicle.half_m.x))
     }
 
     /// Whoever has stood before a full street for long takes another one, if there is any.
