@@ -37,7 +37,7 @@ const MOST_JSON_BYTES: u64 = 1 << 30;
 ///
 /// # Errors
 ///
-/// As [`ingest`], and if the store refuses, has other objects below the URL, or a `share` is asked
+/// As [`ingest()`], and if the store refuses, has other objects below the URL, or a `share` is asked
 /// for: shares meet in a folder.
 pub fn ingest_to(
     url: &ObjectUrl,
