@@ -64,7 +64,7 @@ def sumo_run(town, vehicles, minutes, folder):
     types.write_text(f"<additional>{CAR}</additional>")
     convert = [PROGRAMS / "netconvert", "--opendrive-files", town, "-o", net, "--no-warnings"]
     run([*convert, "--tls.discard-loaded", "--ignore-errors"])
-    random = [sys.executable, TOOLS / "randomTrips.py", "-n", net, "-o", trips, "-e", 60 * minutes]
+    random = [sys.executable, TOOLS / "randomTrips.py", "-n", net, "-o", trips, "-r", folder / f"{town.stem}.rou.xml", "-e", 60 * minutes]
     run([*random, "-p", 0.5, "--seed", 0, "--min-distance", 300, "--validate",
          "--trip-attributes", 'type="car" departLane="best" departSpeed="0"', "--additional-files", types],
         env={**os.environ, "SUMO_HOME": sumo.SUMO_HOME})

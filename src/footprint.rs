@@ -47,12 +47,12 @@ impl Footprint {
         self.half_m.length()
     }
 
-    /// The same rectangle, longer by `ahead_m` at its front.
-    pub fn extended(&self, ahead_m: f64) -> Footprint {
+    /// The same body a share of the way to where it is `next`.
+    pub fn towards(&self, next: &Footprint, share: f64) -> Footprint {
         Footprint {
-            centre_m: self.centre_m + self.forward * (ahead_m / 2.0),
-            half_m: self.half_m + DVec2::new(ahead_m / 2.0, 0.0),
-            ..*self
+            centre_m: self.centre_m.lerp(next.centre_m, share),
+            forward: self.forward.lerp(next.forward, share).normalize_or(next.forward),
+            ..*next
         }
     }
 

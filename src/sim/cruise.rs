@@ -3,14 +3,14 @@
 //! The intelligent driver model (Treiber, Hennecke and Helbing, 2000), with curves as a lower
 //! wish and a stop line as a standing car.
 
-use crate::sim::road::Road;
+use crate::{
+    sim::road::Road,
+    world::car_following::{Ahead, Idm},
+};
 
-/// Parameters of the model: strongest wanted acceleration, comfortable braking, m/s2; time gap,
-/// s; gap at rest, m.
-const ACCELERATION_MPS2: f64 = 1.8;
-const COMFORT_MPS2: f64 = 2.0;
-const TIME_GAP_S: f64 = 1.4;
-const REST_GAP_M: f64 = 2.5;
+/// A calm driver.
+const FOLLOW: Idm =
+    Idm { acceleration_mps2: 1.8, comfort_mps2: 2.0, time_gap_s: 1.4, rest_gap_m: 2.5 };
 
 /// The brakes can do more, but nothing on this road calls for it.
 const HARDEST_MPS2: f64 = 6.0;
@@ -26,14 +26,6 @@ const LINE_GAP_M: f64 = 1.0;
 const NEAR_LINE_M: f64 = 4.0;
 const CREEP_MPS: f64 = 1.0;
 const HOLD_MPS2: f64 = 1.5;
-
-/// The car in front.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ahead {
-    /// From bumper to bumper, m.
-    pub gap_m: f64,
-    pub speed_mps: f64,
-}
 
 /// The part of a driver that minds the pedals; remembers which stop lines are behind it.
 #[derive(Clone, Debug, Default)]
@@ -60,10 +52,9 @@ impl Cruise {
             return -HOLD_MPS2;
         }
         let wish_mps = wish_mps.min(allowed_mps(road, front_m));
-        let free = 1.0 - (speed_mps / wish_mps).powi(4);
-        let following = [ahead, line].into_iter().flatten();
-        let closest = following.map(|a| crowding(speed_mps, a)).fold(0.0, f64::max);
-        (ACCELERATION_MPS2 * (free - closest)).clamp(-HARDEST_MPS2, ACCELERATION_MPS2)
+        let follow = |ahead| FOLLOW.acceleration_mps2(speed_mps, wish_mps, ahead);
+        let following = [ahead, line].into_iter().flatten().map(|ahead| follow(Some(ahead)));
+        following.fold(follow(None), f64::min).max(-HARDEST_MPS2)
     }
 
     /// The next stop line as a standing car, until the wait in front of it is over.
@@ -85,16 +76,8 @@ impl Cruise {
             (self.lines_passed, self.waited_s) = (self.lines_passed + 1, 0.0);
             return None;
         }
-        Some(Ahead { gap_m: to_line_m - LINE_GAP_M + REST_GAP_M, speed_mps: 0.0 })
+        Some(Ahead { gap_m: to_line_m - LINE_GAP_M + FOLLOW.rest_gap_m, speed_mps: 0.0 })
     }
-}
-
-/// The model's interaction term.
-fn crowding(speed_mps: f64, ahead: Ahead) -> f64 {
-    let closing = speed_mps * (speed_mps - ahead.speed_mps);
-    let dynamic =
-        speed_mps * TIME_GAP_S + closing / (2.0 * (ACCELERATION_MPS2 * COMFORT_MPS2).sqrt());
-    ((REST_GAP_M + dynamic.max(0.0)) / ahead.gap_m.max(0.1)).powi(2)
 }
 
 /// The speed from which every limit ahead can be met by comfortable braking.
@@ -104,7 +87,7 @@ fn allowed_mps(road: &Road, from_m: f64) -> f64 {
         .map(|i| {
             let ahead_m = i as f64 * LOOK_EVERY_M;
             let limit = road.speed_limit_mps(from_m + ahead_m);
-            (limit * limit + 2.0 * COMFORT_MPS2 * 0.7 * ahead_m).sqrt()
+            (limit * limit + 2.0 * FOLLOW.comfort_mps2 * 0.7 * ahead_m).sqrt()
         })
         .fold(f64::INFINITY, f64::min)
 }
@@ -152,7 +135,8 @@ mod tests {
         let gap = lead(90.0 - DT_S).0 - s;
         assert!((speed - 6.0).abs() < 0.05, "{speed}");
         // At equilibrium the model's gap is the wanted one, widened by the free term.
-        let wanted = (REST_GAP_M + 6.0 * TIME_GAP_S) / (1.0 - (6.0_f64 / 11.0).powi(4)).sqrt();
+        let wanted =
+            (FOLLOW.rest_gap_m + 6.0 * FOLLOW.time_gap_s) / (1.0 - (6.0_f64 / 11.0).powi(4)).sqrt();
         assert!((gap - wanted).abs() < 0.5, "{gap} {wanted}");
     }
 

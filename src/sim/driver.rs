@@ -9,9 +9,10 @@ use crate::{
     noise::Noise,
     policy::Action,
     sim::{
-        cruise::{Ahead, Cruise},
+        cruise::Cruise,
         road::{OWN_LANE_M, Road},
     },
+    world::car_following::Ahead,
     world::ego::{Car, SEDAN},
 };
 

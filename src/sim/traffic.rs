@@ -6,12 +6,13 @@ use crate::{
     noise::Noise,
     sim::{
         car::{Car, PAINTS},
-        cruise::{Ahead, Cruise},
+        cruise::Cruise,
         driver::DECISION_S,
         road::{LANE_WIDTH_M, OWN_LANE_M, Road, SHOULDER_M},
         scene::{Rgb, Scene},
         scenery::beside,
     },
+    world::car_following::Ahead,
     world::ego::{SEDAN, STEP_S},
 };
 

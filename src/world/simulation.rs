@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use crate::{
-    footprint::Footprint,
     noise::{Noise, Purpose},
     policy::Action,
     towns::scenery::collection::Scenery,
@@ -209,11 +208,6 @@ impl World {
         let near = |a: &DVec2, b: &DVec2| {
             a.lerp(*b, share).distance_squared(footprint.centre_m) < NEAR_M * NEAR_M
         };
-        let now = |a: &Footprint, b: &Footprint| {
-            let centre_m = a.centre_m.lerp(b.centre_m, share);
-            let forward = a.forward.lerp(b.forward, share).normalize_or(b.forward);
-            Footprint { centre_m, forward, ..*b }
-        };
         let vehicles = self.before.vehicles.iter().zip(&self.after.vehicles);
         let vehicles = vehicles
             .filter(|(_, b)| is_level(b.ground_m))
@@ -221,7 +215,7 @@ impl World {
             .map(|(a, b)| Body {
                 other: Other::Vehicle(b.kind),
                 actor: Some(b.id),
-                footprint: now(&a.footprint, &b.footprint),
+                footprint: a.footprint.towards(&b.footprint, share),
                 velocity_mps: b.velocity_mps,
             });
         let walkers = self.before.walkers.iter().zip(&self.after.walkers);
@@ -231,7 +225,7 @@ impl World {
             .map(|(a, b)| Body {
                 other: Other::Walker(b.kind),
                 actor: Some(b.id),
-                footprint: now(&a.footprint, &b.footprint),
+                footprint: a.footprint.towards(&b.footprint, share),
                 velocity_mps: b.velocity_mps,
             });
         let standing = self.scenery.touched_by(&footprint).map(|thing| Body {

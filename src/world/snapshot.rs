@@ -16,9 +16,6 @@ use crate::{
     },
 };
 
-/// Brake lamps come on at this, m/s2.
-pub const BRAKE_LAMPS_MPS2: f64 = -0.6;
-
 /// A vehicle of the traffic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleState {
@@ -57,11 +54,6 @@ impl VehicleState {
     pub fn seen(&self) -> Seen {
         let speed_mps = self.velocity_mps.length();
         Seen { footprint: self.footprint, height_m: self.ground_m, speed_mps }
-    }
-
-    /// Whether its brake lamps are on.
-    pub fn is_braking(&self) -> bool {
-        self.acceleration_mps2 < BRAKE_LAMPS_MPS2 || self.velocity_mps.length() < 0.1
     }
 }
 
@@ -123,11 +115,6 @@ impl Snapshot {
     /// The same world a share of the way to `next`, for those who move: agents live in steps of
     /// 0.1 s, and the ego vehicle in between sees them where they are on their way.
     pub fn towards(&self, next: &Snapshot, share: f64) -> Snapshot {
-        let between = |a: &Footprint, b: &Footprint| Footprint {
-            centre_m: a.centre_m.lerp(b.centre_m, share),
-            forward: a.forward.lerp(b.forward, share).normalize_or(b.forward),
-            half_m: a.half_m,
-        };
         let vehicles = self.vehicles.iter().zip(&next.vehicles);
         let walkers = self.walkers.iter().zip(&next.walkers);
         Snapshot {
@@ -135,10 +122,16 @@ impl Snapshot {
             ego: self.ego,
             ego_ground_m: self.ego_ground_m,
             vehicles: vehicles
-                .map(|(a, b)| VehicleState { footprint: between(&a.footprint, &b.footprint), ..*b })
+                .map(|(a, b)| VehicleState {
+                    footprint: a.footprint.towards(&b.footprint, share),
+                    ..*b
+                })
                 .collect(),
             walkers: walkers
-                .map(|(a, b)| WalkerState { footprint: between(&a.footprint, &b.footprint), ..*b })
+                .map(|(a, b)| WalkerState {
+                    footprint: a.footprint.towards(&b.footprint, share),
+                    ..*b
+                })
                 .collect(),
         }
     }

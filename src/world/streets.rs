@@ -183,8 +183,7 @@ fn curvature(course: &Course) -> Vec<f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conflict {
     pub with: LaneId,
-    /// Arc lengths on the own lane from and to which bodies could meet, m.
-    pub from_m: f64,
+    /// Arc length on the own lane up to which bodies could meet, m.
     pub to_m: f64,
     /// Only bodies that need more room than a car does in a bend could meet.
     pub is_wide: bool,
@@ -299,8 +298,8 @@ impl Streets {
     }
 
     fn conflict(&self, a: LaneId, b: LaneId) -> Option<Conflict> {
-        if let Some((from_m, to_m)) = self.overlap(a, b, CONFLICT_M) {
-            return Some(Conflict { with: b, from_m, to_m, is_wide: false });
+        if let Some((_, to_m)) = self.overlap(a, b, CONFLICT_M) {
+            return Some(Conflict { with: b, to_m, is_wide: false });
         }
         let (from_m, to_m) = self.overlap(a, b, WIDE_CONFLICT_M)?;
         // Lanes that come to lie side by side meet at an angle before.
@@ -313,7 +312,7 @@ impl Streets {
         let middle_m = (from_m + to_m) / 2.0;
         let is_wide = true;
         let meets = [from_m, middle_m, to_m].into_iter().any(turns);
-        meets.then_some(Conflict { with: b, from_m, to_m, is_wide })
+        meets.then_some(Conflict { with: b, to_m, is_wide })
     }
 
     /// The stretch of lane `a` that is nearer than `near_m` to lane `b`.
@@ -344,16 +343,6 @@ impl Streets {
     /// Lanes whose middle line passes nearer than about `radius_m`, ascending.
     pub fn lanes_near(&self, position_m: DVec2, radius_m: f64) -> Vec<LaneId> {
         self.cells.near(position_m, radius_m)
-    }
-
-    /// Whether a place lies on a driving lane, grown by `margin_m`.
-    pub fn is_on_lane(&self, position_m: DVec2, margin_m: f64) -> bool {
-        self.lanes_near(position_m, 4.0 + margin_m).into_iter().any(|id| {
-            let lane = &self.lanes[id];
-            let (s_m, aside_m) = lane.course.project(position_m);
-            let inside = s_m > 0.0 && s_m < lane.length_m();
-            inside && aside_m.abs() < lane.width_m / 2.0 + margin_m
-        })
     }
 }
 

@@ -19,6 +19,7 @@ use pmp::{
         snapshot::{vehicle_states, walker_states},
         streets::{Course, Lane, LaneId, Streets},
         touches::Touches,
+        town::Town,
         traffic::{STEP_S, Traffic},
         vehicle::Vehicle,
         walkers::Walkers,
@@ -289,5 +290,33 @@ fn real_towns_neither_jam_nor_crash() {
         assert!(touches <= 3, "{town}: {touches} touches");
         let theory = tally.steady_gaps_to_theory.unwrap();
         assert!((theory.median - 1.0).abs() < 0.1, "{town}: gaps beside theory {theory:?}");
+    }
+}
+
+/// A bus that stands at the end of a lane that narrows to nothing gets out of it, and nobody stands
+/// where the lane is too narrow.
+#[test]
+fn a_lane_that_drops_is_left_in_time_and_from_standstill() {
+    let town = Town::choose(None, &["Town04".to_string()]).unwrap().swap_remove(0);
+    let lanes = &town.streets.lanes;
+    let drops: Vec<LaneId> = (0..lanes.len()).filter(|id| lanes[*id].next.is_empty()).collect();
+    assert!(!drops.is_empty());
+    for drop in drops {
+        let lane = &lanes[drop];
+        assert!(lane.usable_m < lane.length_m() - 10.0, "{} m", lane.usable_m);
+        let before = lane.previous[0];
+        assert_eq!(lanes[before].dead_end_m, Some(lanes[before].length_m() + lane.usable_m));
+        let mut traffic = Traffic::default();
+        traffic.vehicles.push(vehicle(1, &VEHICLES[4], &town.streets, drop, 5.0));
+        for _ in 0..300 {
+            traffic.step(&town.streets, None, &[]);
+        }
+        let bus = &traffic.vehicles[0];
+        assert!(
+            bus.lane != drop && bus.speed_mps > 3.0,
+            "{} m/s on {}",
+            bus.speed_mps,
+            lanes[bus.lane].name
+        );
     }
 }
