@@ -26,6 +26,8 @@ pub mod dataset;
 pub mod map;
 pub mod towns;
 pub mod world;
+pub mod scene;
+pub mod sensors;
 pub mod sim;
 #[cfg(feature = "learning")]
 pub mod model;

@@ -1,0 +1,4 @@
+//! What the simulated car senses: camera, lidar, radar, odometry, inertial unit, satellites.
+//!
+//! Every sensor is a function of the town's meshes, the instant, the ego vehicle's state, the sky, and
+//! a stream of random numbers of its own.
