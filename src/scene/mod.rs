@@ -10,3 +10,4 @@
 pub mod conditions;
 pub mod mesh;
 pub mod instant;
+pub mod surroundings;
