@@ -24,3 +24,4 @@ pub mod vehicles;
 pub mod two_wheelers;
 pub mod shapes;
 pub mod instant;
+pub mod surroundings;
