@@ -87,7 +87,7 @@ impl Street<'_> {
             if is_raised {
                 self.raised(cuts, borders, paint, &surfaces, mesh);
             } else {
-                cuts.windows(2).for_each(|pair| strip(pair, borders, paint, mesh));
+                self.level(cuts, borders, paint, mesh);
             }
             first = last + 1;
         }
@@ -116,6 +116,16 @@ impl Street<'_> {
         };
         let surfaces = lanes.iter().map(|lane| of(lane.kind, lane.id > 0));
         surfaces.map(|(paint, is_raised)| Surface { paint, is_raised }).collect()
+    }
+
+    /// A strip at the height of the road; grass lies only where nobody drives.
+    fn level(&self, cuts: &[Cut], borders: [usize; 2], paint: Paint, mesh: &mut Mesh) {
+        if paint.material == Material::Asphalt {
+            return cuts.windows(2).for_each(|pair| strip(pair, borders, paint, mesh));
+        }
+        let mut pieces = Vec::new();
+        cuts.windows(2).for_each(|pair| self.add_free([&pair[0], &pair[1]], borders, &mut pieces));
+        pieces.iter().for_each(|pair| strip(pair, borders, paint, mesh));
     }
 
     /// A raised strip between two of the borders, with kerbs towards the carriageway; nothing
@@ -206,11 +216,13 @@ impl Street<'_> {
             mesh.ground_face(&outline, paint);
         };
         if drop_m[0].max(drop_m[1]) < BRIDGE_M {
+            let is_between = self.road.junction.is_some() && !is_raised;
+            let slope = if is_between { ASPHALT } else { GRASS };
             let down = drop_m.map(|drop_m| drop_m + INTO_GROUND_M);
             let out = down.map(|down_m| SHOULDER_M + SLOPE * down_m);
             face(
                 [(0, out[0], -down[0]), (1, out[1], -down[1]), (1, 0.0, top_m), (0, 0.0, top_m)],
-                GRASS,
+                slope,
                 mesh,
             );
             return;

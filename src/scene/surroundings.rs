@@ -9,7 +9,7 @@ use crate::{
     scene::{
         buildings,
         driven::Driven,
-        furniture, marks,
+        furniture, junctions, marks,
         mesh::{Mesh, Vertex},
         streets,
         terrain::{BLOCK_M, Terrain},
@@ -46,6 +46,7 @@ impl Surroundings {
         let mut mesh = Mesh::default();
         terrain.draw(&mut mesh);
         streets::draw(map, &terrain, &driven, &mut mesh);
+        junctions::draw(map, &terrain, &driven, &mut mesh);
         marks::draw(map, &driven, &mut mesh);
         for (number, thing) in scenery.things().iter().enumerate() {
             draw_thing(map, &terrain, thing, number, &mut mesh);

@@ -15,8 +15,8 @@ const BARK: [[u8; 3]; 3] = [[92, 76, 60], [110, 98, 84], [78, 66, 56]];
 /// Radius of a crown, as a share of the tree's height; see [`Kind::Tree`].
 const CROWN: f32 = 0.25;
 
-/// Nothing of a crown that reaches over a road hangs lower, m.
-pub const HEADROOM_M: f32 = 4.7;
+/// Trees that are further from any lane are simpler, m.
+const FAR_M: f32 = 10.0;
 
 /// A tree on the ground at `ground_m`, with `free_m` around it to where cars drive.
 pub fn draw(thing: &Thing, number: usize, ground_m: f32, free_m: f32, mesh: &mut Mesh) {
@@ -28,7 +28,8 @@ pub fn draw(thing: &Thing, number: usize, ground_m: f32, free_m: f32, mesh: &mut
     let bark = paint(Material::Bark, BARK[number % BARK.len()]);
     // Where a road is near, crowns are slender.
     let radius_m = (CROWN * height_m).min(free_m.max(0.5));
-    let tree = Tree { foot_m, height_m, radius_m, number, leaves, bark };
+    let is_far = free_m > FAR_M;
+    let tree = Tree { foot_m, height_m, radius_m, number, is_far, leaves, bark };
     match number % 5 {
         0 => tree.conifer(mesh),
         1 => tree.poplar(mesh),
@@ -41,6 +42,8 @@ struct Tree {
     height_m: f32,
     radius_m: f32,
     number: usize,
+    /// From any road: simpler.
+    is_far: bool,
     leaves: Paint,
     bark: Paint,
 }
@@ -86,7 +89,10 @@ impl Tree {
         let out = Vec2::new(libm::cosf(turn), libm::sinf(turn)) * 0.4 * radius;
         let small = Vec3::new(0.6 * radius, 0.6 * radius, 0.34 * tall);
         self.ball(self.up(0.58) + out.extend(0.0), small, 2, self.leaves.shaded(0.92), mesh);
-        self.ball(self.up(0.72) - out.extend(0.0), 0.9 * small, 3, self.leaves.shaded(1.07), mesh);
+        if !self.is_far {
+            let place = self.up(0.72) - out.extend(0.0);
+            self.ball(place, 0.9 * small, 3, self.leaves.shaded(1.07), mesh);
+        }
     }
 
     /// Tall and slender.
