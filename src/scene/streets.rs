@@ -1,7 +1,7 @@
 //! Streets as surfaces: carriageways, kerbs, side-walks, verges, medians, and the slopes and
 //! bridges that carry them.
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     footprint::Footprint,
@@ -219,12 +219,27 @@ impl Street<'_> {
             let is_between = self.road.junction.is_some() && !is_raised;
             let slope = if is_between { ASPHALT } else { GRASS };
             let down = drop_m.map(|drop_m| drop_m + INTO_GROUND_M);
-            let out = down.map(|down_m| SHOULDER_M + SLOPE * down_m);
-            face(
-                [(0, out[0], -down[0]), (1, out[1], -down[1]), (1, 0.0, top_m), (0, 0.0, top_m)],
-                slope,
-                mesh,
-            );
+            let mut foot =
+                [0, 1].map(|end| at(pair[end], SHOULDER_M + SLOPE * down[end], -down[end]));
+            let edge = [0, 1].map(|end| at(pair[end], 0.0, top_m));
+            // On the inside of tight bends slopes meet in a point, or are left out.
+            let looks_up = |corners: [DVec3; 3]| {
+                let [a, b, c] = corners.map(DVec3::truncate);
+                -side * (b - a).perp_dot(c - a) > 0.0
+            };
+            let is_fair =
+                looks_up([foot[0], foot[1], edge[1]]) && looks_up([foot[0], edge[1], edge[0]]);
+            if !is_fair {
+                foot = [0.5 * (foot[0] + foot[1]); 2];
+                if !looks_up([foot[0], edge[1], edge[0]]) {
+                    return;
+                }
+            }
+            let mut outline = [foot[0], foot[1], edge[1], edge[0]].map(|place| place.as_vec3());
+            if is_left {
+                outline.reverse();
+            }
+            mesh.ground_face(&outline, slope);
             return;
         }
         face(

@@ -55,10 +55,11 @@ impl Tree {
 
     fn trunk(&self, share: f32, mesh: &mut Mesh) {
         let radius_m = (0.022 * self.height_m).clamp(0.08, 0.2);
+        let sides = if self.is_far { 3 } else { 5 };
         let ends = [self.foot_m - Vec3::Z * 0.4, self.up(share)];
         let rings = [
-            circle(ends[0], Vec3::Z, radius_m * 1.2, 5),
-            circle(ends[1], Vec3::Z, radius_m * 0.7, 5),
+            circle(ends[0], Vec3::Z, radius_m * 1.2, sides),
+            circle(ends[1], Vec3::Z, radius_m * 0.7, sides),
         ];
         mesh.loft(&rings, |_, _| self.bark);
     }
@@ -101,23 +102,26 @@ impl Tree {
         let radius = 0.62 * self.radius_m;
         let half_m = 0.41 * self.height_m;
         self.ball(self.up(0.58), Vec3::new(radius, radius, half_m), 1, self.leaves, mesh);
+        if self.is_far {
+            return;
+        }
         let low = Vec3::new(0.9 * radius, 0.9 * radius, 0.55 * half_m);
         self.ball(self.up(0.42), low, 2, self.leaves.shaded(0.94), mesh);
     }
 
     /// Skirts of needles, one above the other.
     fn conifer(&self, mesh: &mut Mesh) {
-        const SIDES: usize = 7;
+        let sides = if self.is_far { 5 } else { 7 };
         self.trunk(0.3, mesh);
         let dark = self.leaves.shaded(0.8);
         for (layer, (low, high, width)) in
             [(0.16, 0.58, 1.0), (0.4, 0.8, 0.74), (0.62, 1.0, 0.48)].into_iter().enumerate()
         {
-            let rim = circle(self.up(low), Vec3::Z, width * self.radius_m, SIDES);
+            let rim = circle(self.up(low), Vec3::Z, width * self.radius_m, sides);
             let turned = 1.0 + 0.1 * self.vary(layer);
             let tip = self.up(high);
-            for k in 0..SIDES {
-                mesh.face(&[rim[k], rim[(k + 1) % SIDES], tip], dark.shaded(turned));
+            for k in 0..sides {
+                mesh.face(&[rim[k], rim[(k + 1) % sides], tip], dark.shaded(turned));
             }
             let below: Vec<Vec3> = rim.iter().rev().copied().collect();
             mesh.face(&below, dark.shaded(0.7));

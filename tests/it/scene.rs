@@ -25,7 +25,7 @@ use pmp::{
 use crate::{fixtures::shared, towns::towns};
 
 /// Side of the squares that triangles are found by, m.
-const SQUARE_M: f64 = 4.0;
+const SQUARE_M: f64 = 8.0;
 
 /// Triangles seen from above.
 struct FromAbove {
@@ -33,7 +33,7 @@ struct FromAbove {
 }
 
 impl FromAbove {
-    /// Triangles of some materials that are smaller than the ground's.
+    /// Triangles of some materials; without those of open country, which are large.
     fn new(surroundings: &Surroundings, is_meant: impl Fn(Material) -> bool) -> FromAbove {
         let mut squares: BTreeMap<[i64; 2], Vec<_>> = BTreeMap::new();
         for tile in &surroundings.tiles {
@@ -41,6 +41,11 @@ impl FromAbove {
                 let corners = tile.mesh.corners_m(triangle).map(Vec3::as_dvec3);
                 let low = corners[0].min(corners[1]).min(corners[2]);
                 let high = corners[0].max(corners[1]).max(corners[2]);
+                let is_open_country = triangle.material == Material::Grass
+                    && (high - low).truncate().max_element() > 20.0;
+                if is_open_country {
+                    continue;
+                }
                 let [west, south] = square(low.truncate());
                 let [east, north] = square(high.truncate());
                 for (x, y) in (west..=east).flat_map(|x| (south..=north).map(move |y| (x, y))) {
@@ -110,7 +115,7 @@ fn is_driving(lane: &pmp::map::opendrive::Lane) -> bool {
 fn wrong_on_lanes(map: &RoadMap, surroundings: &Surroundings) -> Option<String> {
     let is_small = |material| !matches!(material, Material::Facade | Material::StreetLamp);
     let faces = FromAbove::new(surroundings, is_small);
-    for place in driven_m(map, 3.0) {
+    for place in driven_m(map, 8.0) {
         let found = faces.at(place.truncate());
         let is_road = |(height_m, material): &(f64, Material)| {
             *material == Material::Asphalt && (height_m - place.z).abs() < 0.02
@@ -122,7 +127,10 @@ fn wrong_on_lanes(map: &RoadMap, surroundings: &Surroundings) -> Option<String> 
             let above_m = height_m - place.z;
             let is_bridge = above_m > 2.5
                 && matches!(material, Material::Asphalt | Material::Concrete | Material::Grass);
-            above_m > 0.02 && above_m < 4.5 && !is_bridge && *material != Material::Marking
+            // Ways through a junction lie one over the other, nearly at one height.
+            let is_paved =
+                *material == Material::Marking || *material == Material::Asphalt && above_m < 0.1;
+            above_m > 0.02 && above_m < 4.5 && !is_bridge && !is_paved
         });
         if let Some((height_m, material)) = in_way {
             return Some(format!(
@@ -154,27 +162,31 @@ fn upside_down(surroundings: &Surroundings) -> Option<String> {
 
 #[test]
 fn towns_have_roads_where_cars_drive_and_nothing_in_the_way() {
+    let mut wrong = Vec::new();
     for town in towns() {
         let name = town.network.name;
         let scenery = Scenery::derive(&town.map, 0);
         let surroundings = Surroundings::of(&town.map, &scenery);
-        assert_eq!(wrong_on_lanes(&town.map, &surroundings), None, "{name}");
-        assert_eq!(upside_down(&surroundings), None, "{name}");
+        wrong.extend(wrong_on_lanes(&town.map, &surroundings).map(|what| (name, what)));
+        wrong.extend(upside_down(&surroundings).map(|what| (name, what)));
         let triangles = surroundings.triangles();
         assert!((20_000..180_000).contains(&triangles), "{name}: {triangles} triangles");
     }
+    assert_eq!(wrong, []);
 }
 
 #[test]
 fn maps_that_others_made_have_as_well() {
+    let mut wrong = Vec::new();
     for name in ["Town01", "Town02", "Town04"] {
         let Some(path) = shared(&format!("maps/{name}.xodr")) else { return };
         let map = RoadMap::read(&path).unwrap();
         let surroundings = Surroundings::of(&map, &Scenery::derive(&map, 0));
-        assert_eq!(wrong_on_lanes(&map, &surroundings), None, "{name}");
-        assert_eq!(upside_down(&surroundings), None, "{name}");
+        wrong.extend(wrong_on_lanes(&map, &surroundings).map(|what| (name, what)));
+        wrong.extend(upside_down(&surroundings).map(|what| (name, what)));
         assert!(surroundings.triangles() < 180_000, "{name}: {}", surroundings.triangles());
     }
+    assert_eq!(wrong, []);
 }
 
 #[test]
@@ -301,7 +313,7 @@ fn legs_move_with_the_way_that_is_gone() {
         let (low, high) = at(0.0, 0.0).bounds_m().unwrap();
         assert!(low.z.abs() < 1e-3 && (high.z - kind.height_m() as f32).abs() < 1e-3);
         let poses = |speed_mps: f64| {
-            let times = (0..60).map(|step| at(speed_mps, 0.1 * f64::from(step)));
+            let times = (0..300).map(|step| at(speed_mps, 0.01 * f64::from(step)));
             let shown: Vec<_> = times.collect();
             shown.windows(2).filter(|pair| pair[0] != pair[1]).count()
         };
