@@ -24,7 +24,7 @@ const ABOVE_GROUND_M: f64 = 0.05;
 
 /// A place is between roads if one lies within so many cells in most of eight directions.
 const REACH: i64 = 12;
-const MOST: usize = 6;
+const MOST: usize = 7;
 const DIRECTIONS: [(i64, i64); 8] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 

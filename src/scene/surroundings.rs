@@ -95,9 +95,12 @@ fn to_road(map: &RoadMap, thing: &Thing) -> DVec2 {
     left * (road_m - place_m).dot(left).signum()
 }
 
+/// Places of the corners of a tile by the bits of their coordinates.
+type Known = HashMap<[u32; 5], u32>;
+
 /// Triangles by tile; corners that are the same are one.
 fn tiles(mesh: &Mesh) -> Vec<Tile> {
-    let mut cells: BTreeMap<[i64; 2], (Mesh, HashMap<[u32; 5], u32>)> = BTreeMap::new();
+    let mut cells: BTreeMap<[i64; 2], (Mesh, Known)> = BTreeMap::new();
     for triangle in &mesh.triangles {
         let corners = triangle.corners.map(|corner| mesh.vertices[corner as usize]);
         let middle = corners.iter().map(|corner| corner.position_m).sum::<Vec3>() / 3.0;
