@@ -78,7 +78,7 @@ fn height_m([a, b, c]: &[DVec3; 3], place_m: DVec2) -> Option<f64> {
     let (v, w) = (from.perp_dot(ac) / area, ab.perp_dot(from) / area);
     const EDGE: f64 = 1e-4;
     let is_inside = v >= -EDGE && w >= -EDGE && v + w <= 1.0 + EDGE;
-    is_inside.then(|| a.z + v * (b.z - a.z) + w * (c.z - a.z))
+    is_inside.then_some(a.z + v * (b.z - a.z) + w * (c.z - a.z))
 }
 
 /// Places on the driving lanes of a map: in the middle and beside it, world frame, m.
