@@ -55,6 +55,7 @@ mod world;
 mod encoding;
 mod towns;
 mod scenery;
+mod scene;
 mod flow;
 mod recording;
 mod map_fixtures;
