@@ -16,6 +16,9 @@ pub enum Purpose {
     Odometry,
     Imu,
     Latency,
+    Camera,
+    Rain,
+    Lens,
 }
 
 /// A stream of random numbers.
