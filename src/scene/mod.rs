@@ -24,4 +24,3 @@ pub mod vehicles;
 pub mod two_wheelers;
 pub mod shapes;
 pub mod instant;
-pub mod surroundings;

@@ -16,6 +16,10 @@ pub mod lamps;
 pub mod shadows;
 pub mod contact;
 pub mod shading;
+pub mod glows;
+pub mod water;
+pub mod rain;
+pub mod lens;
 pub mod develop;
 
 use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3A};
@@ -29,16 +33,21 @@ use crate::{
         facets::Facets,
         grain::Grain,
         lamps::{Beam, Lamp, LightMap},
+        lens::Lens,
         light::Light,
         raster::Visibility,
         shading::Lighting,
         shadows::Shadows,
         view::View,
+        water::Water,
     },
 };
 
 /// Instants are told apart to this, 1/s: noise and rain are drawn anew for each.
 const TICKS_HZ: f64 = 1000.0;
+
+/// How far rain leans, pixels across for each one down.
+const WIND: f32 = -0.12;
 
 /// Sun shadows and the light of lamps are drawn around a place so far ahead, m.
 const AHEAD_M: f32 = 38.0;
@@ -78,6 +87,7 @@ pub struct Camera {
     lamps: Vec<Lamp>,
     light_map: LightMap,
     openness: Vec<f32>,
+    lens: Lens,
     radiance: Vec<Vec3A>,
     picture: Vec<u8>,
 }
@@ -93,6 +103,7 @@ impl Camera {
             shadows: Shadows::default(),
             lamps: Vec::new(),
             light_map: LightMap::default(),
+            lens: Lens::default(),
             openness: vec![1.0; width * height],
             radiance: vec![Vec3A::ZERO; width * height],
             picture: vec![0; 3 * width * height],
@@ -124,17 +135,26 @@ impl Camera {
         let axes = world_from_ego.matrix3;
         let axes = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| axis.as_vec3a());
         let origin_m = (world_from_ego.translation - world_from_camera.translation).as_vec3a();
+        let beam = Beam::new(&light, axes, origin_m);
         let lighting = Lighting {
             light: &light,
             grain: &self.grain,
             shadows: &self.shadows,
             lamps: &self.light_map,
-            beam: Beam::new(&light, axes, origin_m),
+            beam,
             is_braking: &|body| instant.bodies[body as usize].is_braking,
             drift: Vec2::new(0.06, 0.03) * instant.time_s as f32,
             ground_m: world_from_ego.translation.z as f32,
         };
         lighting.shade(&view, &self.visibility, facets, &self.openness, &mut self.radiance);
+        let radiance = &mut self.radiance;
+        glows::add(&view, &self.visibility, &light, &self.lamps, radiance);
+        let visibility = &self.visibility;
+        let water = Water { view: &view, visibility, facets, light: &light, grain: &self.grain };
+        water.add(radiance);
+        let mut drops = Noise::new(seed, tick, Purpose::Rain);
+        rain::draw(&view, &light, &beam, WIND, &mut drops, radiance);
+        self.lens.draw(&view, &light, seed, instant.time_s, radiance);
         let mut shot = Noise::new(seed, tick, Purpose::Camera);
         self.sensor.develop(&light, &self.radiance, &mut shot, view.width, &mut self.picture);
         &self.picture
