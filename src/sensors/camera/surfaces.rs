@@ -127,20 +127,22 @@ impl Surface {
         let pane = |grown_m: f32| {
             let across =
                 bars(along - margin_m + grown_m, bay_m, size_m.x + 2.0 * grown_m, footprint_m);
-            let upward =
-                bars(up - sill_m + grown_m, STOREY_M, size_m.y + 2.0 * grown_m, footprint_m);
-            across * upward
+            if across == 0.0 {
+                return 0.0;
+            }
+            across * bars(up - sill_m + grown_m, STOREY_M, size_m.y + 2.0 * grown_m, footprint_m)
         };
-        let window = pane(0.0);
-        let frame = (pane(0.09) - window).max(0.0);
+        // From afar frames are too thin to be seen.
+        let framed = if footprint_m < 0.3 { pane(0.09) } else { pane(0.0) };
+        let window = if footprint_m < 0.3 && framed > 0.0 { pane(0.0) } else { framed };
+        let frame = (framed - window).max(0.0);
         let draw = lot(bay, storey, number);
         // Far away the windows of a wall run together, and so does their light.
         let near = smooth(2.5, 1.0, footprint_m);
         let lights = if draw < 0.28 { 0.5 + draw } else { 0.0 };
         let lit = window * (near * lights + (1.0 - near) * 0.15);
-        let stains = grain.at(along * 2.0, up * 0.7, 2.0 * footprint_m)
-            + 0.6 * grain.at(along * 14.0, up * 14.0, 14.0 * footprint_m);
-        let plaster = self.colour * (1.0 + 0.1 * stains);
+        let stains = grain.at(along * 7.0, up * 3.0, 7.0 * footprint_m);
+        let plaster = self.colour * (1.0 + 0.13 * stains);
         let blind = if draw > 0.7 { 0.35 } else { 0.03 + 0.04 * draw };
         let pane_colour = Vec3A::new(0.9, 1.0, 1.1) * blind;
         let light_frame = Vec3A::splat(0.62).lerp(self.colour, 0.3);
