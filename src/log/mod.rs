@@ -6,7 +6,7 @@
 //!           clock: which instant, jumps: where it goes back
 //!           rigs, profile -> mapping: which topic is which signal
 //!           transforms: where each sensor sits
-//! file <- writer (records) <- encode (CDR) <- definitions
+//! file <- writer (records) <- encode (CDR) <- definitions, protobuf_messages (Foxglove's types)
 //! ```
 //!
 //! Nothing here knows about frames: it turns bytes into samples with units.
@@ -51,4 +51,5 @@ pub mod candidates;
 pub mod mapping;
 pub mod definitions;
 pub mod encode;
+pub mod protobuf_messages;
 pub mod writer;
