@@ -16,6 +16,7 @@ pub enum Purpose {
     Odometry,
     Imu,
     Latency,
+    Plan,
 }
 
 /// A stream of random numbers.
