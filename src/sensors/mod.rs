@@ -2,3 +2,5 @@
 //!
 //! Every sensor is a function of the town's meshes, the instant, the ego vehicle's state, the sky, and
 //! a stream of random numbers of its own.
+
+pub mod rays;
