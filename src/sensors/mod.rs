@@ -4,3 +4,10 @@
 //! a stream of random numbers of its own.
 
 pub mod rays;
+pub mod rain;
+pub mod echo;
+pub mod lidar;
+pub mod radar;
+pub mod odometry;
+pub mod imu;
+pub mod gnss;

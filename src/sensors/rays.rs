@@ -151,9 +151,9 @@ impl Tree {
     /// Range, a normal of any length, and the surface that a ray meets first.
     fn first(&self, ray: &Ray) -> Option<(f32, Vec3A, Surface)> {
         let mut hit = RayHit::none();
-        let is_hit = self.boxes.ray_traverse(*ray, &mut hit, |ray, index| {
-            self.triangles[index].intersect(ray)
-        });
+        let is_hit = self
+            .boxes
+            .ray_traverse(*ray, &mut hit, |ray, index| self.triangles[index].intersect(ray));
         let index = hit.primitive_id as usize;
         is_hit.then(|| (hit.t, -self.triangles[index].ng, self.surfaces[index]))
     }
