@@ -16,6 +16,7 @@ pub enum Purpose {
     Odometry,
     Imu,
     Latency,
+    Gnss,
     Plan,
 }
 

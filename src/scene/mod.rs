@@ -9,4 +9,5 @@
 
 pub mod conditions;
 pub mod mesh;
+pub mod surroundings;
 pub mod instant;
