@@ -201,6 +201,7 @@ messages! {
     NavSatFix = "sensor_msgs/msg/NavSatFix",
     CarlaWeatherParameters = "carla_msgs/msg/CarlaWeatherParameters",
     CarlaWorldInfo = "carla_msgs/msg/CarlaWorldInfo",
+    ObjectArray = "derived_object_msgs/msg/ObjectArray",
     Situation = "pmp_msgs/msg/Situation",
 }
 
@@ -382,6 +383,33 @@ fields! {
         sun_altitude_angle: f32,
     }
     CarlaWorldInfo { map_name: String, opendrive: String, }
+
+    Point32 { x: f32, y: f32, z: f32, }
+    Polygon { points: Vec<Point32>, }
+    SolidPrimitive {
+        /// 1 = a box.
+        r#type: u8,
+        /// Of a box: length, width, height.
+        dimensions: Vec<f64>,
+    }
+    /// Somebody or something in the way; in the frame of its header.
+    Object {
+        header: Header,
+        id: u32,
+        /// 1 = followed over time.
+        detection_level: u8,
+        object_classified: bool,
+        pose: Pose,
+        twist: Twist,
+        accel: Accel,
+        polygon: Polygon,
+        shape: SolidPrimitive,
+        /// 4 = pedestrian, 5 = bicycle, 6 = car, 7 = truck, 8 = motorcycle; the definition lists all.
+        classification: u8,
+        classification_certainty: u8,
+        classification_age: u32,
+    }
+    ObjectArray { header: Header, objects: Vec<Object>, }
 
     /// What a map and a route tell of the place where the car is.
     Situation {

@@ -22,6 +22,7 @@ pub const APPLIED_CONTROL: &str = "applied_control";
 pub mod clock;
 pub mod chunk;
 pub mod hashed;
+pub mod head;
 pub mod reader;
 pub mod value;
 pub mod schema;

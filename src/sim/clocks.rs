@@ -48,7 +48,7 @@ pub const CLOCKS: &[Clock] = &[
     Clock { source: Source::Objects,   rate_hz: 10,  phase: 2, latency_s: 0.050, jitter_s: 0.005 },
     Clock { source: Source::Lidar,     rate_hz: 10,  phase: 7, latency_s: 0.045, jitter_s: 0.008 },
     Clock { source: Source::Radar,     rate_hz: 13,  phase: 3, latency_s: 0.025, jitter_s: 0.005 },
-    Clock { source: Source::Gnss,      rate_hz: 5,   phase: 4, latency_s: 0.060, jitter_s: 0.010 },
+    Clock { source: Source::Gnss,      rate_hz: 10,  phase: 4, latency_s: 0.060, jitter_s: 0.010 },
     Clock { source: Source::Route,     rate_hz: 2,   phase: 0, latency_s: 0.004, jitter_s: 0.002 },
 ];
 

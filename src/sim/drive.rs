@@ -6,7 +6,7 @@ use crate::{
     sim::plan::Episode,
     world::{
         density::Counts,
-        episode::{End, Outcome, Watch},
+        episode::{End, Watch},
         expert::{Decision, Expert, ExpertConfig},
         simulation::{SUBSTEPS, World},
         town::{LENGTHS_M, Town},
@@ -60,12 +60,8 @@ impl Drive {
         &self.decision
     }
 
-    /// Let one step of the world pass, and decide anew where a tenth of a second is over; false if
-    /// the drive is over.
-    pub fn step(&mut self) -> bool {
-        if self.end.is_some() {
-            return false;
-        }
+    /// Let one step of the world pass, and decide anew where a tenth of a second is over.
+    pub fn step(&mut self) {
         self.world.step(self.decision.applied);
         self.steps += 1;
         let is_tenth = self.steps.is_multiple_of(SUBSTEPS);
@@ -75,11 +71,14 @@ impl Drive {
         if is_tenth && self.end.is_none() {
             self.decision = self.expert.decide(&self.world);
         }
-        self.end.is_none()
     }
 
-    /// What the drive came to; `None` while it goes on.
-    pub fn outcome(&self) -> Option<Outcome> {
-        Some(self.watch.clone().outcome(&self.world, self.end?))
+    /// How the drive ended; `None` while it goes on.
+    pub fn end(&self) -> Option<&End> {
+        self.end.as_ref()
+    }
+
+    pub fn is_over(&self) -> bool {
+        self.end.is_some()
     }
 }

@@ -15,7 +15,7 @@ use crate::{
     sensors::{gnss::GnssFix, odometry::OdometryReading},
     sim::{
         clouds::{self, Number, Packed},
-        message::Sent,
+        message::{Sent, planar_covariance},
         reading::{self, Object, ObjectKind, Reading},
         rig::{Mounted, Rig},
     },
@@ -203,15 +203,6 @@ fn cloud(stamp_ns: i64, mounted: Mounted, points: Packed) -> PointCloud {
     }
 }
 
-/// Variances of x, y and the turn about z; the car cannot leave the ground.
-fn planar_covariance(linear_std: f64, angular_std: f64) -> Vec<f64> {
-    let mut covariance = vec![0.0; 36];
-    covariance[0] = linear_std * linear_std;
-    covariance[7] = linear_std * linear_std;
-    covariance[35] = angular_std * angular_std;
-    covariance
-}
-
 fn odometry(stamp_ns: i64, reading: &OdometryReading, rig: &Rig) -> Odometry {
     let config = &rig.odometry;
     Odometry {
@@ -224,8 +215,12 @@ fn odometry(stamp_ns: i64, reading: &OdometryReading, rig: &Rig) -> Odometry {
         }),
         linear_velocity: Some(vector(reading.velocity_mps)),
         angular_velocity: Some(vector(DVec3::Z * reading.yaw_rate_radps)),
-        pose_covariance: planar_covariance(config.position_std_m, config.yaw_std_rad),
-        velocity_covariance: planar_covariance(config.velocity_std_mps, config.yaw_rate_std_radps),
+        pose_covariance: planar_covariance(config.position_std_m, config.yaw_std_rad).to_vec(),
+        velocity_covariance: planar_covariance(
+            config.velocity_std_mps,
+            config.yaw_rate_std_radps,
+        )
+        .to_vec(),
         metadata: Vec::new(),
     }
 }

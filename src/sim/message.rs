@@ -27,3 +27,12 @@ impl Sent {
         Sent { topic, message: Box::new(message) }
     }
 }
+
+/// Variances of x, y and the turn about z; the car cannot leave the ground.
+pub fn planar_covariance(linear_std: f64, angular_std: f64) -> [f64; 36] {
+    let mut covariance = [0.0; 36];
+    covariance[0] = linear_std * linear_std;
+    covariance[7] = linear_std * linear_std;
+    covariance[35] = angular_std * angular_std;
+    covariance
+}

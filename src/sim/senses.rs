@@ -1,11 +1,12 @@
 //! The sensors of one drive, each with its own random numbers.
 
 use glam::{DAffine3, DVec3};
-use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
 use crate::{
     noise::{Noise, Purpose},
-    scene::{conditions::Sky, instant::Instant, shapes::Shapes, surroundings::Surroundings},
+    projection,
+    dataset::picture::{jpeg, rgb::Rgb},
+    scene::{conditions::Sky, instant::Instant, shapes::Shapes},
     sensors::{
         camera::Camera,
         gnss::Gnss,
@@ -20,6 +21,7 @@ use crate::{
         plan::Episode,
         reading::{Reading, objects, way_ahead},
         rig::Rig,
+        stage::Stage,
     },
     world::ego::{Car, STEP_S},
 };
@@ -31,7 +33,7 @@ const JPEG_QUALITY: u8 = 90;
 #[derive(Debug)]
 pub struct Senses<'t> {
     rig: &'t Rig,
-    surroundings: &'t Surroundings,
+    stage: &'t Stage,
     shapes: &'t Shapes,
     sky: Sky,
     camera: Camera,
@@ -53,7 +55,7 @@ impl<'t> Senses<'t> {
     /// The sensors at the beginning of a drive.
     pub fn new(
         rig: &'t Rig,
-        surroundings: &'t Surroundings,
+        stage: &'t Stage,
         shapes: &'t Shapes,
         episode: &Episode,
         drive: &Drive,
@@ -62,7 +64,7 @@ impl<'t> Senses<'t> {
         let (mut imu, mut gnss) = (noise(Purpose::Imu), noise(Purpose::Gnss));
         Senses {
             rig,
-            surroundings,
+            stage,
             shapes,
             sky: episode.sky,
             camera: Camera::new(rig.camera.clone()),
@@ -92,8 +94,8 @@ impl<'t> Senses<'t> {
             Source::Camera => Reading::Picture(self.picture(drive)),
             Source::Lidar => {
                 let instant = Instant::of(&world.snapshot(), self.shapes);
-                let reach = Reach::new(self.surroundings, &instant);
                 let (config, pose) = (&self.rig.lidar, world_from_ego(ego, ground_m));
+                let reach = self.reach(&instant, &pose, config.range_m);
                 Reading::Lidar(lidar::turn(config, &reach, &pose, self.sky, &mut self.lidar))
             }
             Source::Radar => Reading::Radar(self.scan(drive)),
@@ -138,23 +140,27 @@ impl<'t> Senses<'t> {
         let instant = Instant::of(&world.snapshot(), self.shapes);
         let pose = world_from_ego(world.ego(), world.ground_m());
         let (sky, seed) = (self.sky, self.camera_seed);
-        let rgb = self.camera.picture(self.surroundings, &instant, &pose, sky, seed);
-        let intrinsics = &self.rig.camera.intrinsics;
-        let (width, height) = (intrinsics.width as u16, intrinsics.height as u16);
-        let mut jpeg = Vec::new();
-        let mut encoder = Encoder::new(&mut jpeg, JPEG_QUALITY);
-        encoder.set_sampling_factor(SamplingFactor::F_2_2);
-        encoder
-            .encode(rgb, width, height, ColorType::Rgb)
-            .expect("a picture of the camera's size fits a JPEG in memory");
-        jpeg
+        let surroundings = &self.stage.surroundings;
+        let data = self.camera.picture(surroundings, &instant, &pose, sky, seed).to_vec();
+        let projection::Camera { width, height, .. } = self.rig.camera.intrinsics;
+        jpeg::encode(&Rgb { width, height, data }, JPEG_QUALITY)
+            .expect("a picture of the camera's size fits a JPEG")
+    }
+
+    /// What a sensor on the car can reach.
+    fn reach<'i>(&self, instant: &'i Instant, pose: &DAffine3, range_m: f64) -> Reach<'i>
+    where
+        't: 'i,
+    {
+        let place_m = pose.translation.as_vec3();
+        Reach::new(&self.stage.standing, instant, place_m, range_m as f32)
     }
 
     fn scan(&mut self, drive: &Drive) -> Vec<RadarReturn> {
         let (world, config) = (&drive.world, &self.rig.radar);
         let instant = Instant::of(&world.snapshot(), self.shapes);
-        let reach = Reach::new(self.surroundings, &instant);
         let pose = world_from_ego(world.ego(), world.ground_m());
+        let reach = self.reach(&instant, &pose, config.range_m);
         let radar_mps = config.velocity_world_mps(world.ego());
         radar::scan(config, &reach, &pose, radar_mps, self.sky, &mut self.radar)
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     policy::Action,
     world::{
-        contact::Contact,
+        contact::{Contact, Other},
         scoring::Sums,
         simulation::{SUBSTEPS, World},
     },
@@ -29,6 +29,22 @@ pub enum End {
     Contact(Contact),
     Timeout,
     OffRoute,
+}
+
+impl End {
+    /// In a word, by whom the ego vehicle touched.
+    pub fn name(&self) -> &'static str {
+        match self {
+            End::Goal => "goal",
+            End::Contact(contact) => match contact.other {
+                Other::Vehicle(_) => "collision-vehicle",
+                Other::Walker(_) => "collision-pedestrian",
+                Other::Static => "collision-static",
+            },
+            End::Timeout => "timeout",
+            End::OffRoute => "off-route",
+        }
+    }
 }
 
 /// A drive, over.

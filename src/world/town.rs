@@ -53,6 +53,15 @@ impl Town {
     /// [`Error::Config`] if there is no town of a name, with those that there are; if a map cannot
     /// be read, as [`RoadMap::read`].
     pub fn choose(maps: Option<&Path>, names: &[String]) -> Result<Vec<Town>> {
+        Town::names(maps, names)?.iter().map(|name| Town::open(maps, name)).collect()
+    }
+
+    /// Names of the towns that are asked for, all if none is, in order and each once.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] if there is no town of a name, with those that there are.
+    pub fn names(maps: Option<&Path>, names: &[String]) -> Result<Vec<String>> {
         let known = match maps {
             None => catalogue::plans().iter().map(|plan| plan.name.to_string()).collect(),
             Some(folder) => names_in(folder)?,
@@ -64,8 +73,7 @@ impl Town {
                 hint: Some(format!("there are {}", known.join(", "))),
             });
         }
-        let chosen = known.iter().filter(|name| names.is_empty() || names.contains(name));
-        chosen.map(|name| Town::open(maps, name)).collect()
+        Ok(known.into_iter().filter(|name| names.is_empty() || names.contains(name)).collect())
     }
 
     /// The route of an episode: any with a length within `lengths_m` that keeps to its lanes. `None`
@@ -94,7 +102,12 @@ impl Town {
         })
     }
 
-    fn open(maps: Option<&Path>, name: &str) -> Result<Town> {
+    /// A town by its name: the file `NAME.xodr` of a folder, or one of the package's own.
+    ///
+    /// # Errors
+    ///
+    /// If its map cannot be read, as [`RoadMap::read`].
+    pub fn open(maps: Option<&Path>, name: &str) -> Result<Town> {
         let map = match maps {
             Some(folder) => RoadMap::read(&folder.join(format!("{name}.xodr")))?,
             None => {
