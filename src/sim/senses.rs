@@ -30,7 +30,6 @@ use crate::{
 const JPEG_QUALITY: u8 = 90;
 
 /// Sensors that remember.
-#[derive(Debug)]
 pub struct Senses<'t> {
     rig: &'t Rig,
     stage: &'t Stage,
