@@ -16,8 +16,8 @@ use crate::{
     },
 };
 
-const KERB_WIDTH_M: f64 = 0.15;
-const KERB_HEIGHT_M: f64 = 0.12;
+pub const KERB_WIDTH_M: f64 = 0.15;
+pub const KERB_HEIGHT_M: f64 = 0.12;
 
 /// Longest stone, m, and how far it may stand off a bent edge, m.
 const KERB_M: f64 = 6.0;
