@@ -11,3 +11,4 @@ pub mod radar;
 pub mod odometry;
 pub mod imu;
 pub mod gnss;
+pub mod camera;

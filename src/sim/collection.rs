@@ -39,7 +39,7 @@ pub const EPISODE_RECORD: &str = "pmp.episode";
 const USUAL_S: u64 = 108;
 
 /// Episodes to record.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Collection {
     /// Folder for the logs; made if it is missing.
     pub out: PathBuf,

@@ -216,11 +216,8 @@ fn odometry(stamp_ns: i64, reading: &OdometryReading, rig: &Rig) -> Odometry {
         linear_velocity: Some(vector(reading.velocity_mps)),
         angular_velocity: Some(vector(DVec3::Z * reading.yaw_rate_radps)),
         pose_covariance: planar_covariance(config.position_std_m, config.yaw_std_rad).to_vec(),
-        velocity_covariance: planar_covariance(
-            config.velocity_std_mps,
-            config.yaw_rate_std_radps,
-        )
-        .to_vec(),
+        velocity_covariance: planar_covariance(config.velocity_std_mps, config.yaw_rate_std_radps)
+            .to_vec(),
         metadata: Vec::new(),
     }
 }

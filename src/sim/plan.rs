@@ -48,12 +48,8 @@ impl Plan {
 
     /// An episode of the plan.
     pub fn episode(&self, number: u32) -> Episode {
-        let sizes = [
-            self.weathers.len(),
-            self.illuminations.len(),
-            self.densities.len(),
-            self.towns.len(),
-        ];
+        let sizes =
+            [self.weathers.len(), self.illuminations.len(), self.densities.len(), self.towns.len()];
         let turn = number as usize;
         let [weather, illumination, density, town] = turns(turn, sizes);
         // The order of the values is the seed's, and another one in each round of combinations.
@@ -140,7 +136,8 @@ impl Episode {
 impl fmt::Display for Episode {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Episode { number, town, sky: Sky { illumination, weather }, traffic, .. } = self;
-        let (weather, illumination, traffic) = (weather.name(), illumination.name(), traffic.name());
+        let (weather, illumination, traffic) =
+            (weather.name(), illumination.name(), traffic.name());
         write!(f, "{town}-{weather}-{illumination}-{traffic}-{number:04}")
     }
 }

@@ -97,7 +97,14 @@ pub fn way_ahead(route: &Route, at_m: f64) -> Vec<Pose> {
 pub fn objects(snapshot: &Snapshot) -> Vec<Object> {
     let vehicles = snapshot.vehicles.iter().map(|vehicle| {
         let kind = ObjectKind::Vehicle(vehicle.kind);
-        (vehicle.id, kind, vehicle.footprint, vehicle.ground_m, vehicle.height_m, vehicle.velocity_mps)
+        (
+            vehicle.id,
+            kind,
+            vehicle.footprint,
+            vehicle.ground_m,
+            vehicle.height_m,
+            vehicle.velocity_mps,
+        )
     });
     let walkers = snapshot.walkers.iter().map(|walker| {
         let (kind, height_m) = (ObjectKind::Walker(walker.kind), walker.kind.height_m());

@@ -40,7 +40,7 @@ pub const SHORTEST_S: f64 = STEP_S;
 pub const LONGEST_S: f64 = 3600.0;
 
 /// How drives are recorded.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Recipe {
     pub rig: Rig,
     pub encoding: Encoding,

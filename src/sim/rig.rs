@@ -8,7 +8,7 @@ use crate::sensors::{
 };
 
 /// All sensors of a car.
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Rig {
     pub camera: CameraConfig,
     pub lidar: LidarConfig,

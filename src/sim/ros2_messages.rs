@@ -281,10 +281,7 @@ fn status(stamp_ns: i64, car: &Car, applied: &Action) -> CarlaEgoVehicleStatus {
     CarlaEgoVehicleStatus {
         header: header(stamp_ns, WORLD),
         velocity: car.velocity_ego_mps().length() as f32,
-        acceleration: Accel {
-            linear: DVec3::X * car.acceleration_mps2,
-            angular: DVec3::ZERO,
-        },
+        acceleration: Accel { linear: DVec3::X * car.acceleration_mps2, angular: DVec3::ZERO },
         orientation: with_positive_w(car.orientation()),
         control: control(stamp_ns, applied),
     }

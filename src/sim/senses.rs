@@ -3,9 +3,9 @@
 use glam::{DAffine3, DVec3};
 
 use crate::{
+    dataset::picture::{jpeg, rgb::Rgb},
     noise::{Noise, Purpose},
     projection,
-    dataset::picture::{jpeg, rgb::Rgb},
     scene::{conditions::Sky, instant::Instant, shapes::Shapes},
     sensors::{
         camera::Camera,

@@ -1,0 +1,199 @@
+//! The visibility buffer: for each pixel how near the nearest facet is, and which it is.
+//!
+//! A pixel shows what lies behind its centre. Triangles that share an edge find the same crossings of
+//! it with the rows, whatever their order, so no pixel between them is left out or drawn twice.
+
+use glam::{Vec2, Vec3};
+
+use crate::sensors::camera::view::{NEAR_M, View};
+
+/// No facet: the sky.
+pub const NOTHING: u32 = u32::MAX;
+
+/// A corner of a triangle in the camera frame, and on the picture if it is in front of the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    pub seen_m: Vec3,
+    pub at_px: Vec2,
+}
+
+impl Corner {
+    #[inline]
+    pub fn new(view: &View, seen_m: Vec3) -> Corner {
+        Corner { seen_m, at_px: view.project_px(seen_m) }
+    }
+}
+
+/// What each pixel shows.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    pub width: usize,
+    pub height: usize,
+    /// 1 / depth, 1/m; 0 where there is nothing. Row by row.
+    pub nearness: Vec<f32>,
+    /// [`NOTHING`], or what was given to [`Visibility::draw`].
+    pub facet: Vec<u32>,
+}
+
+impl Visibility {
+    pub fn new(width: usize, height: usize) -> Visibility {
+        let nearness = vec![0.0; width * height];
+        let facet = vec![NOTHING; width * height];
+        Visibility { width, height, nearness, facet }
+    }
+
+    pub fn clear(&mut self) {
+        self.nearness.fill(0.0);
+        self.facet.fill(NOTHING);
+    }
+
+    /// Draw a triangle, if it faces the camera and lies over the centre of a pixel. Tells whether it
+    /// does, not whether it is seen.
+    #[inline]
+    pub fn draw(&mut self, view: &View, corners: &[Corner; 3], facet: u32) -> bool {
+        let [a, b, c] = corners;
+        let behind = [a, b, c].map(|corner| corner.seen_m.z < NEAR_M);
+        if behind == [false; 3] {
+            if !self.holds_a_centre(corners) {
+                return false;
+            }
+        } else if behind == [true; 3] {
+            return false;
+        }
+        let normal = (b.seen_m - a.seen_m).cross(c.seen_m - a.seen_m);
+        let offset = normal.dot(a.seen_m);
+        // Turned away, or seen from the side.
+        if offset >= -1e-12 {
+            return false;
+        }
+        let slope = normal / offset;
+        // 1 / depth is linear on the picture.
+        let plane = Vec3::new(slope.x / view.focal_px.x, slope.y / view.focal_px.y, slope.z);
+        let plane = plane.with_z(plane.z - plane.truncate().dot(view.centre_px));
+        let nearest_m = a.seen_m.z.min(b.seen_m.z).min(c.seen_m.z).max(NEAR_M);
+        let surface = Surface { plane, most: 1.0 / nearest_m, facet };
+        if behind == [false; 3] {
+            self.fill(&[a.at_px, b.at_px, c.at_px], &surface);
+        } else {
+            self.fill_clipped(view, corners, &surface);
+        }
+        true
+    }
+
+    /// Whether the box around a triangle holds the centre of a pixel.
+    #[inline]
+    fn holds_a_centre(&self, [a, b, c]: &[Corner; 3]) -> bool {
+        let low = a.at_px.min(b.at_px).min(c.at_px);
+        let high = a.at_px.max(b.at_px).max(c.at_px);
+        let (width, height) = (self.width as f32, self.height as f32);
+        if !(high.x > 0.5 && low.x < width && high.y > 0.5 && low.y < height) {
+            return false;
+        }
+        first_centre(low.x, self.width) < first_centre(high.x, self.width)
+            && first_centre(low.y, self.height) < first_centre(high.y, self.height)
+    }
+
+    /// The part of a triangle in front of the near plane.
+    fn fill_clipped(&mut self, view: &View, corners: &[Corner; 3], surface: &Surface) {
+        let mut outline = [Vec2::ZERO; 4];
+        let mut count = 0;
+        for i in 0..3 {
+            let (here, next) = (corners[i].seen_m, corners[(i + 1) % 3].seen_m);
+            if here.z >= NEAR_M {
+                outline[count] = corners[i].at_px;
+                count += 1;
+            }
+            if (here.z >= NEAR_M) != (next.z >= NEAR_M) {
+                // From the same end in both triangles at this edge.
+                let (front, back) = if here.z >= NEAR_M { (here, next) } else { (next, here) };
+                let share = (front.z - NEAR_M) / (front.z - back.z);
+                let crossing = front.lerp(back, share).with_z(NEAR_M);
+                outline[count] = view.project_px(crossing);
+                count += 1;
+            }
+        }
+        for i in 2..count {
+            self.fill(&[outline[0], outline[i - 1], outline[i]], surface);
+        }
+    }
+
+    fn fill(&mut self, corners: &[Vec2; 3], surface: &Surface) {
+        let [mut top, mut middle, mut bottom] = *corners;
+        if middle.y < top.y {
+            std::mem::swap(&mut top, &mut middle);
+        }
+        if bottom.y < middle.y {
+            std::mem::swap(&mut middle, &mut bottom);
+        }
+        if middle.y < top.y {
+            std::mem::swap(&mut top, &mut middle);
+        }
+        let rows = first_centre(top.y, self.height)..first_centre(bottom.y, self.height);
+        if rows.is_empty() {
+            return;
+        }
+        let long = Edge::new(top, bottom);
+        let (upper, lower) = (Edge::new(top, middle), Edge::new(middle, bottom));
+        let bends_right = middle.x > long.x(middle.y);
+        for row in rows {
+            let y = row as f32 + 0.5;
+            let short = if y < middle.y { upper.x(y) } else { lower.x(y) };
+            let (left, right) = if bends_right { (long.x(y), short) } else { (short, long.x(y)) };
+            let from = first_centre(left, self.width);
+            let to = first_centre(right, self.width);
+            if from < to {
+                self.fill_row(row, from, to, surface);
+            }
+        }
+    }
+
+    #[inline]
+    fn fill_row(&mut self, row: usize, from: usize, to: usize, surface: &Surface) {
+        let start = row * self.width;
+        let nearness = &mut self.nearness[start + from..start + to];
+        let facet = &mut self.facet[start + from..start + to];
+        let Surface { plane, most, facet: this } = *surface;
+        let base = plane.x * (from as f32 + 0.5) + (plane.y * (row as f32 + 0.5) + plane.z);
+        for (i, (nearness, facet)) in nearness.iter_mut().zip(facet).enumerate() {
+            let mine = (base + plane.x * i as i32 as f32).min(most);
+            let is_nearer = mine > *nearness;
+            *nearness = if is_nearer { mine } else { *nearness };
+            *facet = if is_nearer { this } else { *facet };
+        }
+    }
+}
+
+/// 1 / depth as a plane over the picture, and what lies there.
+struct Surface {
+    plane: Vec3,
+    /// At the nearest corner: what rounding adds on slim triangles stays below it.
+    most: f32,
+    facet: u32,
+}
+
+/// An edge from its upper end.
+struct Edge {
+    from: Vec2,
+    slope: f32,
+}
+
+impl Edge {
+    #[inline]
+    fn new(upper: Vec2, lower: Vec2) -> Edge {
+        Edge { from: upper, slope: (lower.x - upper.x) / (lower.y - upper.y) }
+    }
+
+    /// Where the edge crosses the height of a row.
+    #[inline]
+    fn x(&self, y: f32) -> f32 {
+        self.from.x + self.slope * (y - self.from.y)
+    }
+}
+
+/// The first pixel of a row or column whose centre lies at or beyond a place; `end` if none does.
+#[inline]
+fn first_centre(place_px: f32, end: usize) -> usize {
+    let from = (place_px - 0.5).max(0.0).min(end as f32);
+    let below = from as i32;
+    (below + i32::from((below as f32) < from)) as usize
+}
