@@ -117,6 +117,14 @@ pub struct Episode {
 }
 
 impl Episode {
+    /// Stamp of its first step, ns since the Unix epoch: episodes start an hour apart, so that no two
+    /// of a collection lie over each other. ROS can say times until 2038.
+    pub fn start_ns(&self) -> i64 {
+        const START_NS: i64 = 1_750_000_000_000_000_000;
+        const APART_NS: i64 = 3_600_000_000_000;
+        START_NS + i64::from(self.number) * APART_NS
+    }
+
     /// What a log tells of its drive.
     pub fn conditions(&self) -> Conditions {
         Conditions {

@@ -28,11 +28,6 @@ use crate::{
 /// Name of the metadata record that says how a drive ended.
 pub const OUTCOME_RECORD: &str = "pmp.outcome";
 
-/// Stamp of the first step of episode 0; episodes start [`EPISODE_APART_NS`] apart, so that no two of
-/// a collection lie over each other. ROS can say times until 2038.
-const START_NS: i64 = 1_750_000_000_000_000_000;
-const EPISODE_APART_NS: i64 = 3_600_000_000_000;
-
 const STEP_NS: i64 = 1_000_000_000 / STEPS_PER_S as i64;
 
 /// Drives may be cut off after this long, s.
@@ -187,7 +182,7 @@ impl<'t> Recorder<'t> {
         recipe: &'t Recipe,
         drive: &Drive,
     ) -> Recorder<'t> {
-        let stamp_ns = START_NS + i64::from(episode.number) * EPISODE_APART_NS;
+        let stamp_ns = episode.start_ns();
         let mut recorder = Recorder {
             recipe,
             senses: Senses::new(&recipe.rig, stage, shapes, episode, drive),
