@@ -18,6 +18,9 @@ pub enum Purpose {
     Latency,
     Gnss,
     Plan,
+    Camera,
+    Rain,
+    Lens,
 }
 
 /// A stream of random numbers.

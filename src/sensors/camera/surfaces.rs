@@ -1,0 +1,151 @@
+//! What surfaces look like from close and from afar: colour by place, window, slab and tile.
+
+use glam::{Vec2, Vec3A};
+
+use crate::{
+    scene::mesh::Material,
+    sensors::camera::{
+        curves::{bars, floor, linear, lot, smooth},
+        facets::Facet,
+        grain::Grain,
+    },
+};
+
+/// From floor to floor, m.
+const STOREY_M: f32 = 3.1;
+
+/// How a place on a surface meets light.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Share of light that comes back in all directions, linear.
+    pub albedo: Vec3A,
+    /// Share of the sky that is mirrored, facing it.
+    pub mirror: f32,
+    /// How much of it is a window of a lit room.
+    pub lit: f32,
+}
+
+/// A facet, prepared for many pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    pub material: Material,
+    colour: Vec3A,
+    /// What is particular to a wall.
+    wall: Wall,
+    is_roof: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Wall {
+    number: u32,
+    bay_m: f32,
+    window_m: Vec2,
+    has_shops: bool,
+}
+
+impl Surface {
+    pub fn new(facet: &Facet) -> Surface {
+        let [r, g, b] = facet.colour.map(u32::from);
+        let number = r << 16 | g << 8 | b;
+        let draw = |of: i32| lot(of, 0, number);
+        let wall = Wall {
+            number,
+            bay_m: 2.3 + 1.0 * draw(1),
+            window_m: Vec2::new(1.05 + 0.35 * draw(2), 1.35 + 0.35 * draw(3)),
+            has_shops: draw(4) < 0.3,
+        };
+        let is_roof = facet.normal.z > 0.15;
+        Surface { material: facet.material, colour: linear(facet.colour), wall, is_roof }
+    }
+
+    /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` are
+    /// coordinates on a wall.
+    #[inline]
+    pub fn look(&self, grain: &Grain, place_m: Vec3A, texture_m: Vec2, footprint_m: f32) -> Look {
+        let at = |texel_m: f32| {
+            let scale = 1.0 / texel_m;
+            grain.at(place_m.x * scale, place_m.y * scale, footprint_m * scale)
+        };
+        let plain = |albedo: Vec3A| Look { albedo, mirror: 0.0, lit: 0.0 };
+        match self.material {
+            Material::Asphalt => {
+                let (fine, broad) = (at(0.02), at(0.35));
+                let patches = smooth(0.12, 0.2, broad) * 0.1;
+                let crack = smooth(0.035, 0.0, broad.abs()) * smooth(0.12, 0.03, footprint_m);
+                let shade = 1.0 + 0.25 * fine + 0.22 * broad - patches - 0.2 * crack;
+                plain(self.colour * (1.25 * shade))
+            }
+            Material::Marking => {
+                let (fine, broad) = (at(0.03), at(0.12));
+                plain(self.colour * (0.92 + 0.1 * fine - 0.3 * smooth(0.25, 0.6, broad)))
+            }
+            Material::Concrete => {
+                let joints = bars(place_m.x, 1.2, 0.03, footprint_m).max(bars(
+                    place_m.y,
+                    1.2,
+                    0.03,
+                    footprint_m,
+                ));
+                let shade = 1.0 + 0.14 * at(0.03) + 0.14 * at(0.3) - 0.4 * joints;
+                plain(self.colour * shade)
+            }
+            Material::Grass => {
+                let (fine, broad) = (at(0.03), at(0.5));
+                let dry = Vec3A::new(1.25, 1.05, 0.8);
+                let tint = Vec3A::ONE.lerp(dry, smooth(-0.3, 0.5, broad));
+                plain(self.colour * tint * (1.0 + 0.5 * fine + 0.25 * broad))
+            }
+            Material::Facade => self.wall(grain, texture_m, footprint_m),
+            Material::Plaster if self.is_roof => {
+                let courses = bars(place_m.z, 0.22, 0.05, footprint_m);
+                plain(self.colour * (1.0 - 0.3 * courses + 0.2 * at(0.2)))
+            }
+            Material::Foliage => {
+                let scale = 1.0 / 0.14;
+                let (x, y) = (place_m.x + 0.6 * place_m.z, place_m.y - 0.8 * place_m.z);
+                let leaves = grain.at(x * scale, y * scale, footprint_m * scale);
+                let clumps = grain.at(y * 1.1, x * 1.1 + place_m.z, footprint_m);
+                plain(self.colour * (0.85 + 0.9 * leaves + 0.4 * clumps).max(0.1))
+            }
+            Material::Bark | Material::Plaster => plain(self.colour * (1.0 + 0.2 * at(0.08))),
+            Material::Glass => Look { albedo: self.colour * 0.5, mirror: 0.5, lit: 0.0 },
+            Material::Coachwork => Look { albedo: self.colour, mirror: 0.1, lit: 0.0 },
+            Material::Metal => Look { albedo: self.colour, mirror: 0.12, lit: 0.0 },
+            _ => plain(self.colour),
+        }
+    }
+
+    /// Windows in bays and storeys, each with its own blinds.
+    fn wall(&self, grain: &Grain, texture_m: Vec2, footprint_m: f32) -> Look {
+        let Wall { number, bay_m, window_m, has_shops } = self.wall;
+        let (along, up) = (texture_m.x, texture_m.y);
+        let (bay, storey) = (floor(along / bay_m), floor(up / STOREY_M));
+        let is_shop = has_shops && storey == 0;
+        let size_m = if is_shop { Vec2::new(bay_m - 0.35, 2.2) } else { window_m };
+        let sill_m = if is_shop { 0.35 } else { 0.95 };
+        let margin_m = 0.5 * (bay_m - size_m.x);
+        let pane = |grown_m: f32| {
+            let across =
+                bars(along - margin_m + grown_m, bay_m, size_m.x + 2.0 * grown_m, footprint_m);
+            let upward =
+                bars(up - sill_m + grown_m, STOREY_M, size_m.y + 2.0 * grown_m, footprint_m);
+            across * upward
+        };
+        let window = pane(0.0);
+        let frame = (pane(0.09) - window).max(0.0);
+        let draw = lot(bay, storey, number);
+        // Far away the windows of a wall run together, and so does their light.
+        let near = smooth(2.5, 1.0, footprint_m);
+        let lights = if draw < 0.28 { 0.5 + draw } else { 0.0 };
+        let lit = window * (near * lights + (1.0 - near) * 0.15);
+        let stains = grain.at(along * 2.0, up * 0.7, 2.0 * footprint_m)
+            + 0.6 * grain.at(along * 14.0, up * 14.0, 14.0 * footprint_m);
+        let plaster = self.colour * (1.0 + 0.1 * stains);
+        let blind = if draw > 0.7 { 0.35 } else { 0.03 + 0.04 * draw };
+        let pane_colour = Vec3A::new(0.9, 1.0, 1.1) * blind;
+        let light_frame = Vec3A::splat(0.62).lerp(self.colour, 0.3);
+        let albedo =
+            plaster * (1.0 - window - frame).max(0.0) + light_frame * frame + pane_colour * window;
+        Look { albedo, mirror: 0.35 * window, lit }
+    }
+}
