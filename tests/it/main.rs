@@ -57,6 +57,7 @@ mod towns;
 mod scenery;
 mod flow;
 mod recording;
+mod ranging;
 mod map_fixtures;
 mod map_geometry;
 mod map_traps;
