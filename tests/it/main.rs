@@ -60,6 +60,7 @@ mod scenery;
 mod flow;
 mod recording;
 mod replay;
+mod ranging;
 mod map_fixtures;
 mod map_geometry;
 mod map_traps;
