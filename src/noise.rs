@@ -16,6 +16,8 @@ pub enum Purpose {
     Odometry,
     Imu,
     Latency,
+    Gnss,
+    Plan,
     Camera,
     Rain,
     Lens,

@@ -10,7 +10,7 @@ use pmp::{
     world::{
         contact::{Fault, Other},
         density::{Counts, Density},
-        drill::{Drill, Drive, LENGTHS_M, run},
+        drill::{Drill, Drive, run},
         ego::{Car, SEDAN},
         episode::{End, drive},
         expert::{Expert, ExpertConfig},
