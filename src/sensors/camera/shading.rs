@@ -15,6 +15,9 @@ use crate::sensors::camera::{
     view::View,
 };
 
+/// Share of the light of the own lamps that drops throw back into the camera.
+const VEIL: f32 = 0.009;
+
 /// Everything that lights a picture.
 pub struct Lighting<'a> {
     pub light: &'a Light,
@@ -84,7 +87,7 @@ impl Lighting<'_> {
     }
 
     fn sky(&self, direction: Vec3A) -> Vec3A {
-        let veil = self.beam.veil(direction) * self.light.haze_per_m * 0.12;
+        let veil = self.beam.veil(direction) * self.light.haze_per_m * VEIL;
         sky::radiance(self.light, self.grain, direction, self.drift) + Vec3A::splat(veil)
     }
 
@@ -157,8 +160,8 @@ impl Lighting<'_> {
     fn haze(&self, colour: Vec3A, direction: Vec3A, distance_m: f32) -> Vec3A {
         let left = fade(self.light.haze_per_m * distance_m);
         // Rain in the beam of the head lamps: most of it comes from the first metres.
-        let veil = self.beam.veil(direction) * self.light.haze_per_m * 0.12;
-        let near = fade(distance_m * 0.12);
+        let veil = self.beam.veil(direction) * self.light.haze_per_m * VEIL;
+        let near = fade(distance_m * 0.3);
         colour * left + self.light.horizon * (1.0 - left) + Vec3A::splat(veil * (1.0 - near))
     }
 }
