@@ -123,7 +123,7 @@ impl Lighting<'_> {
         let direction = from_eye_m / distance_m;
         let facing = (-direction.dot(lit.normal)).max(0.02);
         let footprint_m = depth_m / (view.focal_px.x * facing.sqrt());
-        let texture_m = facet.texture.at_m(Vec3::from(from_eye_m));
+        let texture_m = || facet.texture.at_m(Vec3::from(from_eye_m));
         let look = lit.surface.look(self.grain, place_m, texture_m, footprint_m);
 
         let mut arriving = lit.ambient * openness;

@@ -58,10 +58,16 @@ impl Surface {
         Surface { material: facet.material, colour: linear(facet.colour), wall, is_roof }
     }
 
-    /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` are
+    /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` gives
     /// coordinates on a wall.
     #[inline]
-    pub fn look(&self, grain: &Grain, place_m: Vec3A, texture_m: Vec2, footprint_m: f32) -> Look {
+    pub fn look(
+        &self,
+        grain: &Grain,
+        place_m: Vec3A,
+        texture_m: impl Fn() -> Vec2,
+        footprint_m: f32,
+    ) -> Look {
         let at = |texel_m: f32| {
             let scale = 1.0 / texel_m;
             grain.at(place_m.x * scale, place_m.y * scale, footprint_m * scale)
@@ -95,7 +101,7 @@ impl Surface {
                 let tint = Vec3A::ONE.lerp(dry, smooth(-0.3, 0.5, broad));
                 plain(self.colour * tint * (1.0 + 0.5 * fine + 0.25 * broad))
             }
-            Material::Facade => self.wall(grain, texture_m, footprint_m),
+            Material::Facade => self.wall(grain, texture_m(), footprint_m),
             Material::Plaster if self.is_roof => {
                 let courses = bars(place_m.z, 0.22, 0.05, footprint_m);
                 plain(self.colour * (1.0 - 0.3 * courses + 0.2 * at(0.2)))

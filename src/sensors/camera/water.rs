@@ -1,6 +1,6 @@
 //! Wet ground: a film that mirrors what stands behind it, smeared, and puddles that mirror it clearly.
 
-use glam::Vec3A;
+use glam::{Vec2, Vec3, Vec3A};
 
 use crate::{
     scene::mesh::Material,
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Places along a mirrored ray that are looked at.
-const STEPS: usize = 7;
+const STEPS: usize = 6;
 
 /// A camera is level if its axes are within this of those of the world.
 const LEVEL: f32 = 0.03;
@@ -41,6 +41,8 @@ impl Water<'_> {
         let is_level = axes.x_axis.z.abs() < LEVEL && axes.z_axis.z.abs() < LEVEL;
         for row in 0..view.height {
             let start = row * view.width;
+            let first = view.ray(Vec2::new(0.5, row as f32 + 0.5));
+            let across = axes.x_axis / view.focal_px.x;
             let mut known = (NOTHING, false);
             for column in 0..view.width {
                 let facet = self.visibility.facet[start + column];
@@ -48,7 +50,8 @@ impl Water<'_> {
                     known = (facet, self.is_wet_ground(facet));
                 }
                 if known.1 {
-                    self.mirror(row, column, is_level, radiance);
+                    let ray = first + across * column as f32;
+                    self.mirror(row, column, ray, is_level, radiance);
                 }
             }
         }
@@ -66,11 +69,10 @@ impl Water<'_> {
     }
 
     #[inline]
-    fn mirror(&self, row: usize, column: usize, is_level: bool, radiance: &mut [Vec3A]) {
+    fn mirror(&self, row: usize, column: usize, ray: Vec3, is_level: bool, radiance: &mut [Vec3A]) {
         let (view, light) = (self.view, self.light);
         let place = row * view.width + column;
         let nearness = self.visibility.nearness[place];
-        let ray = view.ray(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
         let from_eye_m = ray / nearness;
         let distance_m = from_eye_m.length();
         let above_m = -from_eye_m.z;
@@ -82,8 +84,7 @@ impl Water<'_> {
         let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing;
         let at_m = view.eye_m + from_eye_m;
         let footprint_m = distance_m / (view.focal_px.x * facing.sqrt());
-        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2)
-            + 0.3 * self.grain.at(at_m.x * 9.0, at_m.y * 9.0, footprint_m * 9.0);
+        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2);
         let edge = 0.42 - 0.42 * light.puddles;
         let puddle = smooth(edge, edge + 0.12, pool) * light.puddles.sqrt();
         let film = 0.42 * light.wetness;
