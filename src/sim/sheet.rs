@@ -2,8 +2,8 @@
 //! traffic.
 //!
 //! ```text
-//! illumination (down) x weather (across)      dense traffic
-//! empty, regular, dense                       clear day
+//! daytime, sunset, night, dark (down) x clear, drizzle, rainy, storm (across): dense traffic
+//! empty, few, regular, dense: clear day
 //! ```
 
 use glam::{DVec2, DVec3};
@@ -57,7 +57,9 @@ impl Sheet {
                     };
                     let sum: usize = (0..SHRUNK * SHRUNK).map(place).sum();
                     let pixel = (at[1] + row) * self.width + at[0] + column;
-                    self.rgb[3 * pixel + channel] = (sum / (SHRUNK * SHRUNK)) as u8;
+                    let mean = (sum / (SHRUNK * SHRUNK)) as u8;
+                    // Noise in the last bits would make up most of the file.
+                    self.rgb[3 * pixel + channel] = mean & !0b11;
                 }
             }
         }
@@ -85,12 +87,11 @@ pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
         let picture = camera.picture(&surroundings, &instant, &world_from_ego, sky, seed);
         sheet.put(picture, width, [column * across, row * down]);
     };
-    for (column, traffic) in [Density::Empty, Density::Regular, Density::Dense].iter().enumerate() {
-        let episode =
-            Episode { number: 0, seed, town: town.name.clone(), sky: CLEAR_DAY, traffic: *traffic };
+    for (column, traffic) in Density::ALL.into_iter().enumerate() {
+        let episode = Episode { number: 0, seed, town: town.name.clone(), sky: CLEAR_DAY, traffic };
         let moment = busiest(Drive::new(town, &episode, 0.0)?);
         take(&moment, CLEAR_DAY, column, Illumination::ALL.len());
-        if *traffic == Density::Dense {
+        if traffic == Density::Dense {
             for (row, illumination) in Illumination::ALL.into_iter().enumerate() {
                 for (column, weather) in Weather::ALL.into_iter().enumerate() {
                     take(&moment, Sky { illumination, weather }, column, row);

@@ -11,10 +11,10 @@ use pmp::{
     world::town::Town,
 };
 
-/// Draw what the camera sees: one moment under 16 skies, and three levels of traffic
+/// Draw what the camera sees: one moment under 16 skies, and four levels of traffic
 ///
 /// Rows: daytime, sunset, night, dark; columns: clear, drizzle, rainy, storm. The last row has a
-/// clear day with empty, regular and dense traffic.
+/// clear day with empty, little, regular and dense traffic.
 #[derive(Args)]
 pub(crate) struct Sheet {
     /// Picture to write, PNG. Replaces what is there
@@ -37,6 +37,7 @@ pub(crate) fn run(args: &Sheet) -> Result<Outcome> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::High);
     let write = |error: png::EncodingError| Error::io("write", out)(std::io::Error::other(error));
     let mut writer = encoder.write_header().map_err(write)?;
     writer.write_image_data(&rgb).map_err(write)?;
