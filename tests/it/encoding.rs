@@ -371,10 +371,7 @@ fn fixes_boxes_weather_and_situations_read_back() {
         speed_limit_mps: 13.5,
         command: "left".into(),
     };
-    check(
-        &situation,
-        &[("in_junction", "true"), ("speed_limit_mps", "13.5"), ("command", "left")],
-    );
+    check(&situation, &[("in_junction", "true"), ("speed_limit_mps", "13.5"), ("command", "left")]);
 }
 
 /// A message as an independent decoder reads it by the descriptors that the log carries.

@@ -16,11 +16,7 @@ use pmp::{
         reading::Reading,
         senses::Senses,
     },
-    world::{
-        ego::Car,
-        expert::Decision,
-        snapshot::Snapshot,
-    },
+    world::{ego::Car, expert::Decision, snapshot::Snapshot},
 };
 use prost::Message as _;
 
@@ -164,6 +160,8 @@ fn state_route_and_labels_of_every_frame_are_what_the_simulator_knew() {
     assert!(frames.iter().any(|frame| frame.perturbed), "no burst in this drive");
     assert!(frames.iter().any(|frame| !frame.perturbed));
     assert!(frames.iter().all(|frame| frame.lidar.is_some()));
+    let turned_rad = wrap_angle(frames[frames.len() - 1].yaw_rad - frames[0].yaw_rad);
+    assert!(turned_rad > 0.5, "the drive turns left: {turned_rad}");
 }
 
 /// Returns of each radar scan by step: place, radial speed.
@@ -248,7 +246,8 @@ fn as_text(frames: &[Frame]) -> String {
     for frame in frames.iter().step_by(5) {
         let [x, y, z] = frame.position_m;
         let point = |xy: &[f32], index: usize| (xy[2 * index], xy[2 * index + 1]);
-        let (near, far) = (point(&frame.route.waypoints_m, 25), point(&frame.route.waypoints_m, 129));
+        let (near, far) =
+            (point(&frame.route.waypoints_m, 25), point(&frame.route.waypoints_m, 129));
         let then = point(&frame.future.xy_m, 29);
         let or_none = |value: Option<f32>| value.map_or("-".into(), |value| format!("{value:.3}"));
         let last = usize::from(frame.future.len).max(1) - 1;
