@@ -47,7 +47,7 @@ pub(crate) struct Shared {
     folder: tempfile::TempDir,
 }
 
-/// Rain at night, dense traffic, steering bursts.
+/// Rain at night, dense traffic, steering bursts; after 5 s it turns left.
 pub(crate) fn shared() -> &'static Shared {
     static SHARED: OnceLock<Shared> = OnceLock::new();
     SHARED.get_or_init(|| {
@@ -56,7 +56,7 @@ pub(crate) fn shared() -> &'static Shared {
             stage: Stage::new(town),
             shapes: Shapes::new(),
             episode: Episode {
-                number: 7,
+                number: 23,
                 seed: 5,
                 town: "Town02".into(),
                 sky: Sky { illumination: Illumination::Night, weather: Weather::Rainy },
@@ -92,7 +92,7 @@ impl Shared {
 
     pub(crate) fn record(&self, recipe: &Recipe, name: &str) -> PathBuf {
         let path = self.folder.path().join(name);
-        let identity = ("me", &BTreeMap::from([("number".to_string(), "7".to_string())]));
+        let identity = ("me", &BTreeMap::from([("number".to_string(), "23".to_string())]));
         record(&self.stage, &self.shapes, &self.episode, recipe, &path, identity, &|| ()).unwrap();
         path
     }
@@ -237,7 +237,7 @@ fn a_log_says_what_the_drive_was_like_and_how_it_ended() {
     let outcome = words(OUTCOME_RECORD).join(" ");
     assert!(outcome.starts_with("duration_s=7.00 end=cut-off pedestrians="), "{outcome}");
     let own = head::metadata(shared().foxglove(), "me").unwrap();
-    assert_eq!(own, Some(BTreeMap::from([("number".to_string(), "7".to_string())])));
+    assert_eq!(own, Some(BTreeMap::from([("number".to_string(), "23".to_string())])));
     assert_eq!(head::metadata(shared().foxglove(), "you").unwrap(), None);
 }
 

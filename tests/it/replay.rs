@@ -160,6 +160,8 @@ fn state_route_and_labels_of_every_frame_are_what_the_simulator_knew() {
     assert!(frames.iter().any(|frame| frame.perturbed), "no burst in this drive");
     assert!(frames.iter().any(|frame| !frame.perturbed));
     assert!(frames.iter().all(|frame| frame.lidar.is_some()));
+    let turned_rad = wrap_angle(frames[frames.len() - 1].yaw_rad - frames[0].yaw_rad);
+    assert!(turned_rad > 0.5, "the drive turns left: {turned_rad}");
 }
 
 /// Returns of each radar scan by step: place, radial speed.

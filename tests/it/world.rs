@@ -17,7 +17,7 @@ use pmp::{
         route::Route,
         scoring::Sums,
         simulation::{SUBSTEPS, Start, World},
-        town::Town,
+        town::{LENGTHS_M, Town},
     },
 };
 use proptest::prelude::*;

@@ -32,7 +32,7 @@ enum Command {
 
 const EXAMPLES: &str = "\
 Examples:
-  pmp-sim record --out logs                              8 drives of a minute each
+  pmp-sim record --out logs                              9 drives of the expert in towns
   pmp-sim towns --out maps                               seven towns, as OpenDRIVE
   pmp-sim map maps/Town03.xodr --picture town3.png       what one looks like
   pmp-sim traffic maps/Town03.xodr                       an hour of its traffic

@@ -30,8 +30,8 @@ pub(crate) struct Record {
     #[arg(short, long, value_name = "LOGS")]
     out: PathBuf,
 
-    /// Drives to record
-    #[arg(long, value_name = "N", default_value_t = 36, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    /// Drives to record; of 9, each of the usual conditions comes once
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     episodes: u32,
 
     /// What routes, conditions, traffic, people and noise are drawn from
