@@ -38,12 +38,8 @@ cargo build --locked --bins
 bin=${CARGO_TARGET_DIR:-$PWD/target}/debug
 
 if [ ${#logs[@]} -eq 0 ]; then
-    if [ ! -d "$out/logs" ]; then
-        say "record: six drives of 40 s on a plain road"
-        rm -rf "$out/logs.part"
-        "$bin/pmp-sim" record --out "$out/logs.part" --episodes 6 --seconds 40 --seed 1
-        mv "$out/logs.part" "$out/logs"
-    fi
+    say "record: six drives of 40 s in towns"
+    "$bin/pmp-sim" record --out "$out/logs" --episodes 6 --seconds 40 --seed 1
     logs=("$out/logs")
 fi
 

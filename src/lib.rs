@@ -16,6 +16,7 @@ pub mod error;
 pub mod atomic;
 pub mod remote;
 pub mod projection;
+pub mod geodesy;
 pub mod drops;
 pub mod frame;
 pub mod log;

@@ -16,6 +16,11 @@ pub enum Purpose {
     Odometry,
     Imu,
     Latency,
+    Gnss,
+    Plan,
+    Camera,
+    Rain,
+    Lens,
 }
 
 /// A stream of random numbers.

@@ -23,8 +23,9 @@ use crate::{
         candidates::measures_no_speed,
         mapping::Mapping,
         profile::Profile,
-        recording::{Recording, Series, Stamped, Topic, Unused, mapping_error},
+        recording::{Recording, Series, Stamped, Topic, Unused, mapping_error, nearest},
         rigs::Rig,
+        signals::Situation,
     },
     projection::Camera,
 };
@@ -48,6 +49,8 @@ pub struct Drive {
     driven: Path,
     /// Planned routes by the time from which they hold.
     planned: Vec<Stamped<Path>>,
+    /// What a map told, ascending by stamp.
+    situations: Vec<Stamped<Situation>>,
     /// Camera, lidar and radar.
     pub senses: Senses,
 }
@@ -159,6 +162,10 @@ impl Drive {
             ));
         }
         let conditions = conditions(&recording, &mapping, &profile, &mut notes);
+        let situations = match topic(&mapping.situation).map(|topic| &topic.series) {
+            Some(Series::Situation(samples)) => samples.clone(),
+            _ => Vec::new(),
+        };
         let driven = Path::driven(&motion.track);
         Ok(Drive {
             mapping,
@@ -172,6 +179,7 @@ impl Drive {
             motion,
             driven,
             planned,
+            situations,
             senses,
             recording,
         })
@@ -225,6 +233,7 @@ impl Drive {
             control_ns: tick.control.as_ref().map(|s| skew(s.stamp_ns)),
         };
         let route = self.route(tick);
+        let situation = self.situation(tick);
         let frame = Frame {
             index: tick.index,
             stamp_ns: tick.stamp_ns,
@@ -235,16 +244,24 @@ impl Drive {
             yaw_rad: tick.ego.yaw_rad,
             position_m: tick.ego.position_m.to_array(),
             action: self.controls.action(tick.control.as_ref().map(|sample| &sample.value)),
-            command: command(&route),
+            command: situation.map_or_else(|| command(&route), |situation| situation.command),
             route,
             future: future(&self.motion.track, tick.stamp_ns, &tick.ego),
             skew,
             conditions: self.conditions.clone(),
-            in_junction: None,
-            speed_limit_mps: None,
+            in_junction: situation.map(|situation| situation.in_junction),
+            speed_limit_mps: situation.map(|situation| situation.speed_limit_mps as f32),
             perturbed: self.controls.is_perturbed(tick.control.as_ref()),
         };
         Made { frame: Ok(Box::new(frame)), damaged }
+    }
+
+    /// What a map tells of the place at a tick, told as near to it as controls have to be.
+    fn situation(&self, tick: &Tick) -> Option<&Situation> {
+        let near = nearest(&self.situations, tick.stamp_ns)?;
+        let tolerance_ns = align::nanos(self.profile.tolerance_ms.control);
+        let is_near = near.stamp_ns.abs_diff(tick.stamp_ns) <= tolerance_ns as u64;
+        is_near.then_some(&near.value)
     }
 
     fn route(&self, tick: &Tick) -> Route {

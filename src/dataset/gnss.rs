@@ -4,7 +4,8 @@
 use glam::{DQuat, DVec3};
 
 use crate::{
-    dataset::{base_frame::BaseFrame, geodesy::TangentPlane, heading::Headings, world::WorldAxes},
+    dataset::{base_frame::BaseFrame, heading::Headings, world::WorldAxes},
+    geodesy::TangentPlane,
     log::{
         recording::{Series, Stamped, Topic},
         signals::{Fix, Pose},

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! samples -> motion -> ego (pose, velocity) -> future, route, control, conditions   labels
-//!            odometry, /tf, dead_reckoning, gnss (geodesy, heading); world, base_frame
+//!            odometry, /tf, dead_reckoning, gnss (heading); world, base_frame
 //!         -> align (grid) -> senses (picture, ralidar) -> drive (frames) -> columns -> shard
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
@@ -14,7 +14,6 @@ pub mod ego;
 pub mod world;
 pub mod base_frame;
 pub mod dead_reckoning;
-pub mod geodesy;
 pub mod heading;
 pub mod gnss;
 pub mod velocity;

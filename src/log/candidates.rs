@@ -181,6 +181,14 @@ pub const TOWN: Candidate = Candidate {
     is_question: |_| false,
 };
 
+pub const SITUATION: Candidate = Candidate {
+    signal: "situation",
+    named: |_| None,
+    fits: |topic, _| topic.kind == Kind::Situation,
+    rank: |_| 0,
+    is_question: |_| false,
+};
+
 /// A pose that is told in the frame that it is the pose of, sent so that a viewer draws a car: it
 /// is in a frame of the car's name, or it stays the identity while `/tf` moves.
 pub fn is_own_frame_pose(topic: &Topic, recording: &Recording) -> bool {

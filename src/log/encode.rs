@@ -5,6 +5,8 @@
 
 use glam::{DQuat, DVec3};
 
+use crate::log::definitions::definition;
+
 /// Byte order of a message; ROS 2 on today's machines writes little.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Endian {
@@ -65,7 +67,7 @@ macro_rules! number_fields {
         }
     )*};
 }
-number_fields!(i32, u32, f32, f64);
+number_fields!(i8, u16, i32, u32, f32, f64);
 
 impl Field for u8 {
     fn put(&self, cdr: &mut Cdr) {
@@ -118,12 +120,24 @@ impl Field for DQuat {
     }
 }
 
+/// What a log says of a message type, so that readers need not know it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Definition {
+    /// Of the definition and of the messages, by MCAP's well-known names.
+    pub schema_encoding: &'static str,
+    pub message_encoding: &'static str,
+    pub data: Vec<u8>,
+}
+
 /// A whole message, as a topic carries it.
 pub trait Message: Send {
-    /// `package/msg/Type`, a key of [`definition`](crate::log::definitions::definition).
+    /// Name of the type: `package/msg/Type` of ROS 2, `package.Type` of protobuf.
     fn schema(&self) -> &'static str;
 
-    /// Encapsulation header and body.
+    /// The definition of the type; `None` if there is none.
+    fn definition(&self) -> Option<Definition>;
+
+    /// The bytes of the message; the byte order is a question in ROS 2 alone.
     fn encode(&self, endian: Endian) -> Vec<u8>;
 }
 
@@ -151,6 +165,15 @@ macro_rules! messages {
                 $schema
             }
 
+            fn definition(&self) -> Option<Definition> {
+                let text = definition($schema)?;
+                Some(Definition {
+                    schema_encoding: "ros2msg",
+                    message_encoding: "cdr",
+                    data: text.into_bytes(),
+                })
+            }
+
             fn encode(&self, endian: Endian) -> Vec<u8> {
                 let mut cdr = Cdr::new(endian);
                 self.put(&mut cdr);
@@ -175,6 +198,11 @@ messages! {
     CarlaEgoVehicleControl = "carla_msgs/msg/CarlaEgoVehicleControl",
     CarlaEgoVehicleStatus = "carla_msgs/msg/CarlaEgoVehicleStatus",
     RadarScan = "radar_msgs/msg/RadarScan",
+    NavSatFix = "sensor_msgs/msg/NavSatFix",
+    CarlaWeatherParameters = "carla_msgs/msg/CarlaWeatherParameters",
+    CarlaWorldInfo = "carla_msgs/msg/CarlaWorldInfo",
+    ObjectArray = "derived_object_msgs/msg/ObjectArray",
+    Situation = "pmp_msgs/msg/Situation",
 }
 
 /// When and in which frame: `std_msgs/Header`.
@@ -323,6 +351,74 @@ fields! {
         amplitude: f32,
     }
     RadarScan { header: Header, returns: Vec<RadarReturn>, }
+
+    NavSatStatus {
+        /// 0 = a fix, negative = none.
+        status: i8,
+        /// 1 = GPS; the definition lists all.
+        service: u16,
+    }
+    NavSatFix {
+        header: Header,
+        status: NavSatStatus,
+        /// Degrees, WGS 84; altitude above the ellipsoid, m.
+        latitude: f64,
+        longitude: f64,
+        altitude: f64,
+        /// East, north, up, m2.
+        position_covariance: [f64; 9],
+        /// 2 = the diagonal is known.
+        position_covariance_type: u8,
+    }
+    /// Percent and degrees, as the simulator CARLA takes them.
+    CarlaWeatherParameters {
+        cloudiness: f32,
+        precipitation: f32,
+        precipitation_deposits: f32,
+        wind_intensity: f32,
+        fog_density: f32,
+        fog_distance: f32,
+        wetness: f32,
+        sun_azimuth_angle: f32,
+        sun_altitude_angle: f32,
+    }
+    CarlaWorldInfo { map_name: String, opendrive: String, }
+
+    Point32 { x: f32, y: f32, z: f32, }
+    Polygon { points: Vec<Point32>, }
+    SolidPrimitive {
+        /// 1 = a box.
+        r#type: u8,
+        /// Of a box: length, width, height.
+        dimensions: Vec<f64>,
+    }
+    /// Somebody or something in the way; in the frame of its header.
+    Object {
+        header: Header,
+        id: u32,
+        /// 1 = followed over time.
+        detection_level: u8,
+        object_classified: bool,
+        pose: Pose,
+        twist: Twist,
+        accel: Accel,
+        polygon: Polygon,
+        shape: SolidPrimitive,
+        /// 4 = pedestrian, 5 = bicycle, 6 = car, 7 = truck, 8 = motorcycle; the definition lists all.
+        classification: u8,
+        classification_certainty: u8,
+        classification_age: u32,
+    }
+    ObjectArray { header: Header, objects: Vec<Object>, }
+
+    /// What a map and a route tell of the place where the car is.
+    Situation {
+        header: Header,
+        in_junction: bool,
+        speed_limit_mps: f32,
+        /// As [`crate::frame::Command`] names it.
+        command: String,
+    }
 }
 
 #[cfg(test)]

@@ -33,6 +33,7 @@ pub struct Mapping {
     pub route: Option<String>,
     pub weather: Option<String>,
     pub town: Option<String>,
+    pub situation: Option<String>,
     /// Why a topic was chosen among several, and what is missing.
     pub notes: Vec<String>,
 }
@@ -93,6 +94,7 @@ impl Mapping {
             route: chooser.topic(&candidates::ROUTE)?,
             weather: chooser.topic(&candidates::WEATHER)?,
             town: chooser.topic(&candidates::TOWN)?,
+            situation: chooser.topic(&candidates::SITUATION)?,
             notes: chooser.notes,
         })
     }
@@ -119,6 +121,7 @@ impl Mapping {
             ("route", &self.route),
             ("weather", &self.weather),
             ("town", &self.town),
+            ("junction, speed limit and command", &self.situation),
         ];
         let named: Vec<_> = uses
             .into_iter()

@@ -6,7 +6,7 @@
 //!           clock: which instant, jumps: where it goes back
 //!           rigs, profile -> mapping: which topic is which signal
 //!           transforms: where each sensor sits
-//! file <- writer (records) <- encode (CDR) <- definitions
+//! file <- writer (records) <- encode (CDR) <- definitions, protobuf_messages (Foxglove's types)
 //! ```
 //!
 //! Nothing here knows about frames: it turns bytes into samples with units.
@@ -22,6 +22,7 @@ pub const APPLIED_CONTROL: &str = "applied_control";
 pub mod clock;
 pub mod chunk;
 pub mod hashed;
+pub mod head;
 pub mod reader;
 pub mod value;
 pub mod schema;
@@ -51,4 +52,5 @@ pub mod candidates;
 pub mod mapping;
 pub mod definitions;
 pub mod encode;
+pub mod protobuf_messages;
 pub mod writer;

@@ -17,7 +17,8 @@ use crate::{
         jumps::{Course, JUMP_NS},
         reader::{Channel, Log, Message, Place},
         signals::{
-            self, CarlaStatus, Control, Fix, Header, Inertial, Kind, Odometry, Pose, Weather,
+            self, CarlaStatus, Control, Fix, Header, Inertial, Kind, Odometry, Pose, Situation,
+            Weather,
         },
         transforms::TransformTree,
         value::Struct,
@@ -50,6 +51,7 @@ pub enum Series {
     Path(Vec<Stamped<Vec<DVec3>>>),
     Weather(Vec<Stamped<Weather>>),
     Town(Vec<Stamped<String>>),
+    Situation(Vec<Stamped<Situation>>),
 }
 
 /// A topic that pmp can use.
@@ -175,6 +177,7 @@ impl Topic {
             }
             Kind::Weather => Series::Weather(Vec::new()),
             Kind::WorldInfo => Series::Town(Vec::new()),
+            Kind::Situation => Series::Situation(Vec::new()),
             Kind::CarlaStatus => Series::Status(Vec::new()),
             Kind::Path => Series::Path(Vec::new()),
             // Transforms go to the tree; the series stays empty.
@@ -313,6 +316,9 @@ impl Topic {
             Series::Town(samples) => {
                 samples.push(Stamped { stamp_ns, value: signals::carla_town(&decode()?)? });
             }
+            Series::Situation(samples) => {
+                samples.push(Stamped { stamp_ns, value: signals::situation(&decode()?)? });
+            }
         }
         Ok(())
     }
@@ -397,6 +403,7 @@ macro_rules! with_samples {
             Series::Fix($samples) => $body,
             Series::Weather($samples) => $body,
             Series::Town($samples) => $body,
+            Series::Situation($samples) => $body,
         }
     };
 }
@@ -480,6 +487,7 @@ impl Series {
             Series::Fix(samples) => Series::Fix(samples.split_off(at)),
             Series::Weather(samples) => Series::Weather(samples.split_off(at)),
             Series::Town(samples) => Series::Town(samples.split_off(at)),
+            Series::Situation(samples) => Series::Situation(samples.split_off(at)),
         }
     }
 }

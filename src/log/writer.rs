@@ -1,4 +1,4 @@
-//! Messages in, an MCAP file out: what a ROS 2 recorder would have left.
+//! Messages in, an MCAP file out: what a recorder would have left.
 //!
 //! The file grows under a temporary name beside its own and takes that when it is finished, so a
 //! drive that was cut off never looks whole. No wall clock and no thread count gets into the
@@ -19,10 +19,7 @@ use mcap::{
 use crate::{
     atomic::unfinished_name,
     error::{Error, Result},
-    log::{
-        definitions::definition,
-        encode::{Endian, Message},
-    },
+    log::encode::{Endian, Message},
 };
 
 /// How chunks are stored.
@@ -41,6 +38,8 @@ pub struct LogOptions {
     /// Bytes of messages after which a chunk is closed, before compression.
     pub chunk_bytes: u64,
     pub endian: Endian,
+    /// What MCAP calls the profile: `ros2`, or nothing where messages are no ROS messages.
+    pub profile: &'static str,
 }
 
 impl Default for LogOptions {
@@ -50,6 +49,7 @@ impl Default for LogOptions {
             // About one second of a drive with camera and lidar: a reader holds one or two.
             chunk_bytes: 2 * 1024 * 1024,
             endian: Endian::Little,
+            profile: "ros2",
         }
     }
 }
@@ -81,7 +81,7 @@ impl LogWriter {
         let temporary = unfinished_name(path);
         let file = File::create(&temporary).map_err(Error::io("create", &temporary))?;
         let mcap = WriteOptions::new()
-            .profile("ros2")
+            .profile(options.profile)
             .library(concat!("pmp/", env!("CARGO_PKG_VERSION")))
             .compression(match options.compression {
                 ChunkCompression::Zstd => Some(mcap::Compression::Zstd),
@@ -106,7 +106,7 @@ impl LogWriter {
     /// be written.
     pub fn write(&mut self, topic: &str, message: &dyn Message, log_time_ns: i64) -> Result<()> {
         if !self.topics.contains_key(topic) {
-            let added = self.add_topic(topic, message.schema())?;
+            let added = self.add_topic(topic, message)?;
             self.topics.insert(topic.to_owned(), added);
         }
         let Some(known) = self.topics.get_mut(topic).filter(|t| t.schema == message.schema())
@@ -150,13 +150,16 @@ impl LogWriter {
         Ok(())
     }
 
-    fn add_topic(&mut self, topic: &str, schema: &'static str) -> Result<Topic> {
-        let text = definition(schema)
+    fn add_topic(&mut self, topic: &str, message: &dyn Message) -> Result<Topic> {
+        let schema = message.schema();
+        let definition = message
+            .definition()
             .ok_or_else(|| self.refused(format!("no definition of {schema} for {topic}")))?;
+        let encoding = definition.message_encoding;
         let channel = self
             .mcap
-            .add_schema(schema, "ros2msg", text.as_bytes())
-            .and_then(|id| self.mcap.add_channel(id, topic, "cdr", &BTreeMap::new()))
+            .add_schema(schema, definition.schema_encoding, &definition.data)
+            .and_then(|id| self.mcap.add_channel(id, topic, encoding, &BTreeMap::new()))
             .map_err(|e| mcap_error(&self.temporary, e))?;
         Ok(Topic { channel, schema, written: 0 })
     }

@@ -3,4 +3,12 @@
 //! Every sensor is a function of the town's meshes, the instant, the ego vehicle's state, the sky, and
 //! a stream of random numbers of its own.
 
+pub mod rays;
+pub mod rain;
+pub mod echo;
+pub mod lidar;
+pub mod radar;
+pub mod odometry;
+pub mod imu;
+pub mod gnss;
 pub mod camera;

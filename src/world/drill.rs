@@ -1,33 +1,20 @@
 //! Many drives of the expert, to know that the world can be driven in: who arrives, and why not.
 
-use std::{collections::BTreeMap, fmt, ops::Range, sync::Arc};
+use std::{collections::BTreeMap, fmt, ops::Range};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    map::{planner::Planner, route::MapRoute},
     noise::{Noise, Purpose},
     world::{
         density::{Counts, Density},
-        ego::{Car, SEDAN},
         episode::{End, Outcome, drive},
         expert::{Expert, ExpertConfig},
-        route::Route,
-        simulation::{Start, World},
         town::Town,
         walkers::Crossings,
     },
 };
-
-/// Lengths of routes, m (paper, section III.B).
-pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
-
-/// What a lane change costs the planner, m.
-const LANE_CHANGE_M: f64 = 30.0;
-
-/// Routes that are drawn before a town counts as one without any.
-const ATTEMPTS: u64 = 64;
 
 /// Which drives.
 #[derive(Clone, Debug)]
@@ -76,24 +63,10 @@ pub fn run(towns: &[Town], drill: &Drill, on: &(dyn Fn(&Drive) + Sync)) -> Vec<D
 
 fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Drive> {
     // The same routes whatever the traffic, and others in each town and level for all else.
-    let planner = Planner::new(&town.map, LANE_CHANGE_M);
-    let draw = |attempt: u64| {
-        let seed = drill.seed << 32 | u64::from(episode) << 8 | attempt;
-        let route = MapRoute::random(&planner, seed, drill.lengths_m.clone())?;
-        Route::new(&route, &town.streets).filter(|route| !route.strays())
-    };
-    let route = Arc::new((0..ATTEMPTS).find_map(draw)?);
+    let route = town.route(drill.seed, episode, drill.lengths_m.clone())?;
     let stream = episode << 2 | traffic as u32;
     let counts = traffic.draw(&mut Noise::new(drill.seed, stream, Purpose::Scenery));
-    let mut world = World::new(Start {
-        streets: town.streets.clone(),
-        scenery: town.scenery.clone(),
-        ego: at_start(&route),
-        route,
-        counts,
-        seed: drill.seed,
-        episode: stream,
-    });
+    let mut world = town.world(route, counts, drill.seed, stream);
     let mut expert = Expert::new(drill.expert, drill.seed, stream);
     let (mut emergencies, mut was_emergency) = (0, false);
     let counts = world.counts();
@@ -114,11 +87,6 @@ fn one(town: &Town, traffic: Density, episode: u32, drill: &Drill) -> Option<Dri
         crossings: world.walkers.crossings,
         hash: world.snapshot().hash(),
     })
-}
-
-/// A car at rest on the first waypoint.
-fn at_start(route: &Route) -> Car {
-    Car::at_rest(SEDAN, route.waypoints()[0].position_m, route.forward(0.0).to_angle())
 }
 
 /// All drives, for people and for programs.

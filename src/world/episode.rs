@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     policy::Action,
     world::{
-        contact::Contact,
+        contact::{Contact, Other},
         scoring::Sums,
         simulation::{SUBSTEPS, World},
     },
@@ -31,6 +31,22 @@ pub enum End {
     OffRoute,
 }
 
+impl End {
+    /// In a word, by whom the ego vehicle touched.
+    pub fn name(&self) -> &'static str {
+        match self {
+            End::Goal => "goal",
+            End::Contact(contact) => match contact.other {
+                Other::Vehicle(_) => "collision-vehicle",
+                Other::Walker(_) => "collision-pedestrian",
+                Other::Static => "collision-static",
+            },
+            End::Timeout => "timeout",
+            End::OffRoute => "off-route",
+        }
+    }
+}
+
 /// A drive, over.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -40,12 +56,48 @@ pub struct Outcome {
     pub sums: Sums,
 }
 
+/// Looks on as somebody drives, and says when the drive is over.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    limit_s: f64,
+    sums: Sums,
+}
+
+impl Watch {
+    /// Of a drive that has not begun.
+    pub fn new(world: &World) -> Watch {
+        let limit_s = world.route.length_m() / SLOWEST_MPS + GRACE_S;
+        Watch { limit_s, sums: Sums::default() }
+    }
+
+    /// Look at the world, every 0.1 s and at the first contact; `Some` when the drive is over.
+    pub fn look(&mut self, world: &World) -> Option<End> {
+        let (route, ego, progress_m) = (&world.route, world.ego(), world.progress_m());
+        self.sums.add(&world.streets, route, progress_m, ego);
+        if let Some(contact) = world.contact() {
+            return Some(End::Contact(*contact));
+        }
+        let left_m = route.length_m() - progress_m;
+        if left_m < GOAL_M && ego.position_m.distance(route.goal_m()) < GOAL_M {
+            return Some(End::Goal);
+        }
+        if route.at(progress_m).position_m.distance(ego.position_m) > OFF_ROUTE_M {
+            return Some(End::OffRoute);
+        }
+        (world.time_s() > self.limit_s).then_some(End::Timeout)
+    }
+
+    /// What the drive came to.
+    pub fn outcome(self, world: &World, end: End) -> Outcome {
+        let (route_m, progress_m) = (world.route.length_m(), world.progress_m());
+        Outcome { end, route_m, progress_m, sums: self.sums }
+    }
+}
+
 /// Let a driver drive; it is asked every 0.1 s.
 pub fn drive(world: &mut World, driver: &mut dyn FnMut(&World) -> Action) -> Outcome {
-    let route = world.route.clone();
-    let limit_s = route.length_m() / SLOWEST_MPS + GRACE_S;
-    let mut sums = Sums::default();
-    let end = loop {
+    let mut watch = Watch::new(world);
+    loop {
         let action = driver(world);
         for _ in 0..SUBSTEPS {
             world.step(action);
@@ -53,21 +105,8 @@ pub fn drive(world: &mut World, driver: &mut dyn FnMut(&World) -> Action) -> Out
                 break;
             }
         }
-        let (ego, progress_m) = (world.ego(), world.progress_m());
-        sums.add(&world.streets, &route, progress_m, ego);
-        if let Some(contact) = world.contact() {
-            break End::Contact(*contact);
+        if let Some(end) = watch.look(world) {
+            return watch.outcome(world, end);
         }
-        let left_m = route.length_m() - progress_m;
-        if left_m < GOAL_M && ego.position_m.distance(route.goal_m()) < GOAL_M {
-            break End::Goal;
-        }
-        if route.at(progress_m).position_m.distance(ego.position_m) > OFF_ROUTE_M {
-            break End::OffRoute;
-        }
-        if world.time_s() > limit_s {
-            break End::Timeout;
-        }
-    };
-    Outcome { end, route_m: route.length_m(), progress_m: world.progress_m(), sums }
+    }
 }

@@ -1,14 +1,30 @@
 //! Towns to drive in: the package's own, or OpenDRIVE files in their place.
 
-use std::{fs, path::Path, sync::Arc};
+use std::{fs, ops::Range, path::Path, sync::Arc};
 
 use crate::{
     atomic::file_name,
     error::{Error, Result},
-    map::{reader, road_map::RoadMap},
+    map::{planner::Planner, reader, road_map::RoadMap, route::MapRoute},
     towns::{catalogue, scenery::collection::Scenery},
-    world::{paving::pave, streets::Streets},
+    world::{
+        density::Counts,
+        ego::{Car, SEDAN},
+        paving::pave,
+        route::Route,
+        simulation::{Start, World},
+        streets::Streets,
+    },
 };
+
+/// Lengths of routes, m (paper, section III.B).
+pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
+
+/// What a lane change costs the planner, m.
+const LANE_CHANGE_M: f64 = 30.0;
+
+/// Routes that are drawn before a town counts as one without any.
+const ATTEMPTS: u64 = 64;
 
 /// Scenery is the same in all episodes of a town.
 const SCENERY_SEED: u64 = 0;
@@ -37,6 +53,15 @@ impl Town {
     /// [`Error::Config`] if there is no town of a name, with those that there are; if a map cannot
     /// be read, as [`RoadMap::read`].
     pub fn choose(maps: Option<&Path>, names: &[String]) -> Result<Vec<Town>> {
+        Town::names(maps, names)?.iter().map(|name| Town::open(maps, name)).collect()
+    }
+
+    /// Names of the towns that are asked for, all if none is, in order and each once.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] if there is no town of a name, with those that there are.
+    pub fn names(maps: Option<&Path>, names: &[String]) -> Result<Vec<String>> {
         let known = match maps {
             None => catalogue::plans().iter().map(|plan| plan.name.to_string()).collect(),
             Some(folder) => names_in(folder)?,
@@ -48,11 +73,41 @@ impl Town {
                 hint: Some(format!("there are {}", known.join(", "))),
             });
         }
-        let chosen = known.iter().filter(|name| names.is_empty() || names.contains(name));
-        chosen.map(|name| Town::open(maps, name)).collect()
+        Ok(known.into_iter().filter(|name| names.is_empty() || names.contains(name)).collect())
     }
 
-    fn open(maps: Option<&Path>, name: &str) -> Result<Town> {
+    /// The route of an episode: any with a length within `lengths_m` that keeps to its lanes. `None`
+    /// if the town seems to have none.
+    pub fn route(&self, seed: u64, episode: u32, lengths_m: Range<f64>) -> Option<Arc<Route>> {
+        let planner = Planner::new(&self.map, LANE_CHANGE_M);
+        let draw = |attempt: u64| {
+            let seed = seed << 32 | u64::from(episode) << 8 | attempt;
+            let route = MapRoute::random(&planner, seed, lengths_m.clone())?;
+            Route::new(&route, &self.streets).filter(|route| !route.strays())
+        };
+        (0..ATTEMPTS).find_map(draw).map(Arc::new)
+    }
+
+    /// The town with a car at rest where a route begins, and with agents.
+    pub fn world(&self, route: Arc<Route>, counts: Counts, seed: u64, episode: u32) -> World {
+        let start_m = route.waypoints()[0].position_m;
+        World::new(Start {
+            streets: self.streets.clone(),
+            scenery: self.scenery.clone(),
+            ego: Car::at_rest(SEDAN, start_m, route.forward(0.0).to_angle()),
+            route,
+            counts,
+            seed,
+            episode,
+        })
+    }
+
+    /// A town by its name: the file `NAME.xodr` of a folder, or one of the package's own.
+    ///
+    /// # Errors
+    ///
+    /// If its map cannot be read, as [`RoadMap::read`].
+    pub fn open(maps: Option<&Path>, name: &str) -> Result<Town> {
         let map = match maps {
             Some(folder) => RoadMap::read(&folder.join(format!("{name}.xodr")))?,
             None => {

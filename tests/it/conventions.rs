@@ -6,9 +6,10 @@ use std::fs;
 
 use glam::{DQuat, DVec3};
 use pmp::{
-    dataset::{conditions, geodesy},
+    dataset::conditions,
     drops::Reason,
     frame::{Frame, RouteSource},
+    geodesy,
     log::signals::Weather,
 };
 use proptest::prelude::*;

@@ -142,6 +142,7 @@ fn manifest() -> Manifest {
         route: text("/route"),
         weather: text("/weather"),
         town: text("/world"),
+        situation: text("/situation"),
         notes: vec!["a note".into()],
     };
     let mut camera = Camera::from_fov(600, 250, 1.5);

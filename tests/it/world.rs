@@ -10,14 +10,14 @@ use pmp::{
     world::{
         contact::{Fault, Other},
         density::{Counts, Density},
-        drill::{Drill, Drive, LENGTHS_M, run},
+        drill::{Drill, Drive, run},
         ego::{Car, SEDAN},
         episode::{End, drive},
         expert::{Expert, ExpertConfig},
         route::Route,
         scoring::Sums,
         simulation::{SUBSTEPS, Start, World},
-        town::Town,
+        town::{LENGTHS_M, Town},
     },
 };
 use proptest::prelude::*;

@@ -8,9 +8,9 @@ use pmp::{
     error::Result,
     world::{
         density::Density,
-        drill::{self, LENGTHS_M},
+        drill,
         expert::ExpertConfig,
-        town::Town,
+        town::{LENGTHS_M, Town},
     },
 };
 

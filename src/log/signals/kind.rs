@@ -28,6 +28,8 @@ pub enum Kind {
     Actuation,
     Weather,
     WorldInfo,
+    /// What a map and a route tell of the place where the car is.
+    Situation,
 }
 
 impl Kind {
@@ -58,14 +60,15 @@ impl Kind {
             "tier4_vehicle_msgs/ActuationStatusStamped" => Kind::Actuation,
             "geometry_msgs/PoseStamped" | "geometry_msgs/PoseWithCovarianceStamped" => Kind::Pose,
             "nav_msgs/Path" => Kind::Path,
-            "sensor_msgs/Imu" => Kind::Imu,
+            "sensor_msgs/Imu" | "pmp.Imu" => Kind::Imu,
             "sensor_msgs/NavSatFix" => Kind::Fix,
             "tf2_msgs/TFMessage" | "tf/tfMessage" => Kind::Transforms,
             "ackermann_msgs/AckermannDriveStamped" => Kind::Ackermann,
-            "carla_msgs/CarlaEgoVehicleControl" => Kind::CarlaControl,
+            "carla_msgs/CarlaEgoVehicleControl" | "pmp.Control" => Kind::CarlaControl,
             "carla_msgs/CarlaEgoVehicleStatus" => Kind::CarlaStatus,
             "carla_msgs/CarlaWeatherParameters" => Kind::Weather,
             "carla_msgs/CarlaWorldInfo" => Kind::WorldInfo,
+            "pmp.Situation" | "pmp_msgs/Situation" => Kind::Situation,
             _ => return None,
         })
     }

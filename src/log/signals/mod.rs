@@ -13,6 +13,7 @@ pub mod camera;
 pub mod radar;
 pub mod route;
 pub mod conditions;
+pub mod situation;
 
 pub use camera::camera_info;
 pub use conditions::{Weather, carla_town, carla_weather};
@@ -28,3 +29,4 @@ pub use header::{Header, header, header_of_first_field};
 pub use kind::Kind;
 pub use radar::{RadarReturn, polar, radar_scan, radar_tracks};
 pub use route::path;
+pub use situation::{Situation, situation};

@@ -54,7 +54,7 @@ impl Visibility {
         let [a, b, c] = corners;
         let behind = [a, b, c].map(|corner| corner.seen_m.z < NEAR_M);
         if behind == [false; 3] {
-            if !self.holds_a_centre(corners) {
+            if !self.holds_a_centre(&corners.map(|corner| corner.at_px)) {
                 return false;
             }
         } else if behind == [true; 3] {
@@ -80,11 +80,29 @@ impl Visibility {
         true
     }
 
+    /// Draw a triangle that was not seen in perspective: pixels, and how near it is (above 0, linear
+    /// on the picture). Which facet it was is not kept; both sides count.
+    #[inline]
+    pub fn draw_flat(&mut self, corners: [Vec3; 3]) {
+        let [a, b, c] = corners;
+        let at_px = corners.map(Vec3::truncate);
+        if !self.holds_a_centre(&at_px) {
+            return;
+        }
+        let normal = (b - a).cross(c - a);
+        if normal.z.abs() < 1e-6 {
+            return;
+        }
+        let slope = -normal.truncate() / normal.z;
+        let plane = slope.extend(a.z - slope.dot(a.truncate()));
+        self.fill(&at_px, &Surface { plane, most: a.z.max(b.z).max(c.z), facet: 0 });
+    }
+
     /// Whether the box around a triangle holds the centre of a pixel.
     #[inline]
-    fn holds_a_centre(&self, [a, b, c]: &[Corner; 3]) -> bool {
-        let low = a.at_px.min(b.at_px).min(c.at_px);
-        let high = a.at_px.max(b.at_px).max(c.at_px);
+    fn holds_a_centre(&self, [a, b, c]: &[Vec2; 3]) -> bool {
+        let low = a.min(*b).min(*c);
+        let high = a.max(*b).max(*c);
         let (width, height) = (self.width as f32, self.height as f32);
         if !(high.x > 0.5 && low.x < width && high.y > 0.5 && low.y < height) {
             return false;

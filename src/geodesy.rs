@@ -1,4 +1,5 @@
-//! Latitudes and longitudes to metres: the plane that touches the earth at one place.
+//! Latitudes and longitudes to metres and back: the plane that touches the earth at one place, which
+//! ingest and the simulator share.
 //!
 //! WGS 84, as NIMA TR8350.2 defines it: geodetic to earth-centred coordinates in closed form, and
 //! from there into the axes east, north, up of the place. Exact at any distance, as a chord is;
@@ -50,5 +51,25 @@ impl TangentPlane {
     pub fn enu(&self, latitude_deg: f64, longitude_deg: f64, height_m: f64) -> DVec3 {
         let place = earth_centred(latitude_deg, longitude_deg, height_m);
         self.enu_from_earth * (place - self.origin_m)
+    }
+
+    /// Latitude and longitude, degrees, and height above the ellipsoid, metres, of a place on the
+    /// plane or off it: what [`TangentPlane::enu`] undoes.
+    pub fn geodetic(&self, enu_m: DVec3) -> [f64; 3] {
+        let point = self.enu_from_earth.transpose() * enu_m + self.origin_m;
+        let flat_m = point.x.hypot(point.y);
+        // Where the normal of the ellipsoid through the point meets the polar axis depends on the
+        // latitude; each turn leaves a share of the error as small as the eccentricity's square.
+        let mut latitude = point.z.atan2(flat_m * (1.0 - ECCENTRICITY_2));
+        let mut normal_m = EQUATOR_RADIUS_M;
+        for _ in 0..7 {
+            let sin = latitude.sin();
+            normal_m = EQUATOR_RADIUS_M / (1.0 - ECCENTRICITY_2 * sin * sin).sqrt();
+            latitude = (point.z + ECCENTRICITY_2 * normal_m * sin).atan2(flat_m);
+        }
+        let (sin, cos) = latitude.sin_cos();
+        // Along the normal, which is well defined at the equator and at the poles alike.
+        let height_m = flat_m * cos + (point.z + ECCENTRICITY_2 * normal_m * sin) * sin - normal_m;
+        [latitude.to_degrees(), point.y.atan2(point.x).to_degrees(), height_m]
     }
 }

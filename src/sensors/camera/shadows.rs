@@ -1,0 +1,149 @@
+//! Shadows: of the sun, by looking from it, and below bodies, where little of the sky is seen.
+
+use glam::{Mat3, Vec2, Vec3, Vec3A};
+
+use crate::{
+    scene::{
+        instant::Instant,
+        mesh::{Material, Mesh},
+        surroundings::Surroundings,
+    },
+    sensors::camera::{
+        curves::floor,
+        light::{Light, luminance},
+        raster::Visibility,
+    },
+};
+
+/// Texels of the shadow map along a side, and their size, m.
+const SIDE: usize = 512;
+const TEXEL_M: f32 = 0.18;
+
+/// What stands further from the middle of the map throws no shadow onto it, m.
+const CASTERS_M: f32 = 100.0;
+
+/// What reaches further from its origin does so outside the map, m.
+const BODY_M: f32 = 7.0;
+
+/// A surface does not shade itself within this, m.
+const BIAS_M: f32 = 0.12;
+
+/// Heights along the light are counted from so far below, m.
+const DEPTH_M: f32 = 1000.0;
+
+/// The area that the map covers.
+#[derive(Clone, Copy, Debug)]
+struct Area {
+    /// Rows: across, up, towards the sun.
+    sun_from_world: Mat3,
+    middle_m: Vec3,
+}
+
+/// How near to the sun the first surface is that meets its light, over an area ahead of the camera.
+#[derive(Clone, Debug)]
+pub struct Shadows {
+    map: Visibility,
+    places_px: Vec<Vec3>,
+    /// `None` where no sun shines.
+    area: Option<Area>,
+}
+
+impl Default for Shadows {
+    fn default() -> Shadows {
+        Shadows { map: Visibility::new(SIDE, SIDE), places_px: Vec::new(), area: None }
+    }
+}
+
+impl Area {
+    fn new(light: &Light, middle_m: Vec3) -> Area {
+        let sun = Vec3::from(light.sun_direction);
+        let across = Vec3::Z.cross(sun).normalize_or(Vec3::X);
+        let world_from_sun = Mat3::from_cols(across, sun.cross(across), sun);
+        let sun_from_world = world_from_sun.transpose();
+        // Texels keep their places in the world, so edges do not crawl.
+        let middle = sun_from_world * middle_m;
+        let snapped = (middle.truncate() / TEXEL_M).floor() * TEXEL_M;
+        Area { sun_from_world, middle_m: world_from_sun * snapped.extend(middle.z) }
+    }
+
+    /// Whether a box (world frame) may throw a shadow onto the map.
+    fn may_be_shaded_by(&self, low_m: Vec3, high_m: Vec3) -> bool {
+        let (centre, half) = ((low_m + high_m) * 0.5 - self.middle_m, (high_m - low_m) * 0.5);
+        let reach = SIDE as f32 / 2.0 * TEXEL_M;
+        let meets = |axis: Vec3| centre.dot(axis).abs() < reach + (axis.abs() * half).element_sum();
+        let world_from_sun = self.sun_from_world.transpose();
+        centre.length() < CASTERS_M + half.length()
+            && meets(world_from_sun.x_axis)
+            && meets(world_from_sun.y_axis)
+    }
+
+    /// Texels, and height towards the sun, m.
+    #[inline]
+    fn place_px(&self, place_m: Vec3) -> Vec3 {
+        let seen = self.sun_from_world * (place_m - self.middle_m);
+        let at = seen.truncate() / TEXEL_M + SIDE as f32 / 2.0;
+        at.extend(seen.z + DEPTH_M)
+    }
+}
+
+/// Whether it stands up from the ground.
+fn throws_shadow(material: Material) -> bool {
+    use Material::{Asphalt, Concrete, Grass, Marking};
+    !matches!(material, Asphalt | Marking | Concrete | Grass)
+}
+
+impl Shadows {
+    /// Look from the sun at what lies around `middle_m` (world frame).
+    pub fn draw(
+        &mut self,
+        light: &Light,
+        surroundings: &Surroundings,
+        instant: &Instant,
+        middle_m: Vec3,
+    ) {
+        self.area = (luminance(light.sun) > 0.1).then(|| Area::new(light, middle_m));
+        let Some(area) = self.area else { return };
+        self.map.clear();
+        for tile in &surroundings.tiles {
+            if area.may_be_shaded_by(tile.low_m, tile.high_m) {
+                self.draw_mesh(&tile.mesh, &|place_m| area.place_px(place_m));
+            }
+        }
+        for body in &instant.bodies {
+            let centre_m = Vec3::from(body.world_from_body.translation);
+            if area.may_be_shaded_by(centre_m - BODY_M, centre_m + BODY_M) {
+                let place_m = |place_m| body.world_from_body.transform_point3(place_m);
+                self.draw_mesh(&body.mesh, &|at_m| area.place_px(place_m(at_m)));
+            }
+        }
+    }
+
+    fn draw_mesh(&mut self, mesh: &Mesh, place_px: &dyn Fn(Vec3) -> Vec3) {
+        self.places_px.clear();
+        self.places_px.extend(mesh.vertices.iter().map(|vertex| place_px(vertex.position_m)));
+        for triangle in mesh.triangles.iter().filter(|triangle| throws_shadow(triangle.material)) {
+            let corners = triangle.corners.map(|corner| self.places_px[corner as usize]);
+            self.map.draw_flat(corners);
+        }
+    }
+
+    /// Share of the sun's light that arrives at a place, world frame, m.
+    #[inline]
+    pub fn sunlight(&self, place_m: Vec3A, normal: Vec3A) -> f32 {
+        let Some(area) = &self.area else { return 1.0 };
+        let place = area.place_px(Vec3::from(place_m + normal * 0.06));
+        let at = Vec2::new(place.x - 0.5, place.y - 0.5);
+        let (column, row) = (floor(at.x), floor(at.y));
+        let inside = 0..SIDE as i32 - 1;
+        if !inside.contains(&column) || !inside.contains(&row) {
+            return 1.0;
+        }
+        let height_m = place.z + BIAS_M;
+        let start = row as usize * SIDE + column as usize;
+        let open = |texel: usize| f32::from(u8::from(self.map.nearness[texel] < height_m));
+        let (across, up) = (at.x - column as f32, at.y - row as f32);
+        let below = open(start) + (open(start + 1) - open(start)) * across;
+        let above = open(start + SIDE) + (open(start + SIDE + 1) - open(start + SIDE)) * across;
+        below + (above - below) * up
+    }
+}

@@ -1,0 +1,171 @@
+//! Whom a ray meets first: trees of boxes over the triangles of a town, and over those of all that
+//! moves.
+//!
+//! The tree of a town is built once, with time spent on its quality. What moves is few triangles,
+//! and of those only the bodies near a sensor count, so their tree is built anew at every instant.
+
+use std::time::Duration;
+
+use glam::{Affine3A, Vec3, Vec3A};
+use obvhs::{
+    BvhBuildParams,
+    bvh2::{Bvh2, builder::build_bvh2_from_tris},
+    ray::{Ray, RayHit},
+    rt_triangle::RtTriangle,
+    triangle,
+};
+
+use crate::{
+    scene::{
+        instant::{Body, Instant},
+        mesh::{Material, Mesh, Triangle},
+        surroundings::Surroundings,
+    },
+    world::reservation::ActorId,
+};
+
+/// No body reaches further from its origin than this, m.
+const LARGEST_BODY_M: f32 = 12.0;
+
+/// What a ray has met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    pub range_m: f32,
+    /// Unit vector that leaves the surface on the side of the ray; world frame.
+    pub normal: Vec3,
+    pub material: Material,
+    /// sRGB.
+    pub colour: [u8; 3],
+    /// `None` for what stands.
+    pub actor: Option<ActorId>,
+    /// World frame, m/s.
+    pub velocity_mps: Vec3,
+}
+
+/// All that stands in a town, ready for rays.
+pub struct Standing(Tree);
+
+impl Standing {
+    pub fn new(surroundings: &Surroundings) -> Standing {
+        let mut corners = Vec::new();
+        let mut surfaces = Vec::new();
+        for tile in &surroundings.tiles {
+            add(&tile.mesh, &Affine3A::IDENTITY, &mut corners);
+            surfaces.extend(tile.mesh.triangles.iter().map(|triangle| Surface::of(triangle, None)));
+        }
+        Standing(Tree::new(&corners, &surfaces, BvhBuildParams::slow_build()))
+    }
+}
+
+/// All that a sensor can reach at one instant.
+pub struct Reach<'a> {
+    standing: &'a Standing,
+    bodies: &'a [Body],
+    moving: Tree,
+}
+
+impl<'a> Reach<'a> {
+    /// What stands, and the bodies that come within `range_m` of a place.
+    pub fn new(
+        standing: &'a Standing,
+        instant: &'a Instant,
+        place_m: Vec3,
+        range_m: f32,
+    ) -> Reach<'a> {
+        let mut corners = Vec::new();
+        let mut surfaces = Vec::new();
+        let reach_m = range_m + LARGEST_BODY_M;
+        for (index, body) in instant.bodies.iter().enumerate() {
+            let origin_m: Vec3 = body.world_from_body.translation.into();
+            if origin_m.distance_squared(place_m) > reach_m * reach_m {
+                continue;
+            }
+            add(&body.mesh, &body.world_from_body, &mut corners);
+            let triangles = body.mesh.triangles.iter();
+            surfaces.extend(triangles.map(|triangle| Surface::of(triangle, Some((index, body)))));
+        }
+        let moving = Tree::new(&corners, &surfaces, BvhBuildParams::fastest_build());
+        Reach { standing, bodies: &instant.bodies, moving }
+    }
+
+    /// What a ray meets first within `max_m`; `direction` is a unit vector, both in the world frame.
+    pub fn hit(&self, origin_m: Vec3, direction: Vec3, max_m: f32) -> Option<Hit> {
+        let mut ray = Ray::new(origin_m.into(), direction.into(), 0.0, max_m);
+        let moving = self.moving.first(&ray);
+        if let Some((range_m, _, _)) = moving {
+            ray.tmax = range_m;
+        }
+        let (range_m, out, surface) = self.standing.0.first(&ray).or(moving)?;
+        let out = if out.dot(ray.direction) > 0.0 { -out } else { out };
+        let body = surface.body.map(|index| &self.bodies[index as usize]);
+        Some(Hit {
+            range_m,
+            normal: out.normalize_or_zero().into(),
+            material: surface.material,
+            colour: surface.colour,
+            actor: body.map(|body| body.actor),
+            velocity_mps: body.map_or(Vec3::ZERO, |body| body.velocity_mps.as_vec3()),
+        })
+    }
+}
+
+/// What is particular to a triangle besides its place.
+#[derive(Clone, Copy)]
+struct Surface {
+    material: Material,
+    colour: [u8; 3],
+    /// Index of the body that it belongs to.
+    body: Option<u32>,
+}
+
+impl Surface {
+    fn of(triangle: &Triangle, body: Option<(usize, &Body)>) -> Surface {
+        let colour = match (triangle.material, body) {
+            (Material::Coachwork | Material::Jacket, Some((_, body))) => body.colour,
+            _ => triangle.colour,
+        };
+        let body = body.map(|(index, _)| index as u32);
+        Surface { material: triangle.material, colour, body }
+    }
+}
+
+/// Triangles below boxes.
+struct Tree {
+    boxes: Bvh2,
+    /// Both in the order of the leaves.
+    triangles: Vec<RtTriangle>,
+    surfaces: Vec<Surface>,
+}
+
+impl Tree {
+    fn new(corners: &[triangle::Triangle], surfaces: &[Surface], params: BvhBuildParams) -> Tree {
+        let boxes = build_bvh2_from_tris(corners, params, &mut Duration::default());
+        let order = boxes.primitive_indices.iter().map(|index| *index as usize);
+        Tree {
+            triangles: order.clone().map(|index| RtTriangle::from(&corners[index])).collect(),
+            surfaces: order.map(|index| surfaces[index]).collect(),
+            boxes,
+        }
+    }
+
+    /// Range, a normal of any length, and the surface that a ray meets first.
+    fn first(&self, ray: &Ray) -> Option<(f32, Vec3A, Surface)> {
+        let mut hit = RayHit::none();
+        let is_hit = self
+            .boxes
+            .ray_traverse(*ray, &mut hit, |ray, index| self.triangles[index].intersect(ray));
+        let index = hit.primitive_id as usize;
+        is_hit.then(|| (hit.t, -self.triangles[index].ng, self.surfaces[index]))
+    }
+}
+
+/// Append the triangles of a mesh, placed in the world.
+fn add(mesh: &Mesh, world_from_mesh: &Affine3A, corners: &mut Vec<triangle::Triangle>) {
+    let places_m: Vec<Vec3A> = (mesh.vertices.iter())
+        .map(|vertex| world_from_mesh.transform_point3a(vertex.position_m.into()))
+        .collect();
+    corners.extend(mesh.triangles.iter().map(|triangle| {
+        let [v0, v1, v2] = triangle.corners.map(|corner| places_m[corner as usize]);
+        triangle::Triangle { v0, v1, v2 }
+    }));
+}
