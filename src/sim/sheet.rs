@@ -30,6 +30,9 @@ const BETWEEN_STEPS: u64 = 50;
 /// Pixels of a picture that become one, along each side.
 const SHRUNK: usize = 2;
 
+/// Brightness is told apart in steps of this.
+const LEVELS: u8 = 5;
+
 const CLEAR_DAY: Sky = Sky { illumination: Illumination::Daytime, weather: Weather::Clear };
 
 /// RGB, row by row, 3 bytes a pixel.
@@ -59,7 +62,7 @@ impl Sheet {
                     let pixel = (at[1] + row) * self.width + at[0] + column;
                     let mean = (sum / (SHRUNK * SHRUNK)) as u8;
                     // Noise in the last bits would make up most of the file.
-                    self.rgb[3 * pixel + channel] = mean & !0b11;
+                    self.rgb[3 * pixel + channel] = mean - mean % LEVELS;
                 }
             }
         }

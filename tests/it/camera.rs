@@ -283,8 +283,11 @@ fn street_lamp(ahead_m: f32, aside_m: f32) -> Tile {
 /// Luminances of a street with somebody 15 m ahead, and without.
 fn street_with_and_without(id: u32, sky: Sky) -> (Vec<f64>, Vec<f64>) {
     let mut camera = Camera::new(CameraConfig::default());
-    let street =
-        town(vec![ground(300.0), wall(60.0, 60.0, 12.0, Material::Plaster, [176, 168, 158])]);
+    let street = town(vec![
+        ground(300.0),
+        wall(60.0, 60.0, 12.0, Material::Plaster, [176, 168, 158]),
+        street_lamp(19.0, -6.0),
+    ]);
     let mut look = |bodies: Vec<Body>| {
         let instant = Instant { time_s: 5.0, bodies };
         luminances(camera.picture(&street, &instant, &DAffine3::IDENTITY, sky, 1))

@@ -56,13 +56,13 @@ impl Sensor {
                     let exposed = value * light.exposure;
                     let toned =
                         exposed * (1.0 + exposed * (1.0 / (WHITE * WHITE))) / (1.0 + exposed);
-                    let toned = toned.max(0.0).min(1.0);
+                    let toned = toned.clamp(0.0, 1.0);
                     // Close to the power 1 / 2.2.
                     let root = toned.sqrt();
                     let bright = root * 0.83 + root.sqrt() * 0.2 - toned * 0.03;
                     // Less of it where there is light.
                     let grown = light.noise * (1.3 - bright) * draw;
-                    *byte = (bright * 255.0 + grown + 0.5).max(0.0).min(255.0) as i32 as u8;
+                    *byte = (bright * 255.0 + grown + 0.5).clamp(0.0, 255.0) as i32 as u8;
                 }
                 (left, values) = (later, &values[count..]);
             }
