@@ -1,6 +1,6 @@
 //! Where cars drive, with heights: what is raised beside one road must not stand on another.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rstar::{
     AABB, RTree,
     primitives::{GeomWithData, Rectangle},
@@ -58,6 +58,16 @@ impl Driven {
         Driven { surfaces: RTree::bulk_load(surfaces.into_iter().map(entry).collect()) }
     }
 
+    /// Convex outlines of what is driven on within a box, counter-clockwise, m.
+    pub fn outlines(&self, low_m: DVec3, high_m: DVec3) -> Vec<Vec<DVec2>> {
+        let corners = [low_m, high_m].map(|corner| corner.truncate().to_array());
+        let window = AABB::from_corners(corners[0], corners[1]);
+        let near = self.surfaces.locate_in_envelope_intersecting(window);
+        let heights = low_m.z - LEVEL_M..high_m.z + LEVEL_M;
+        let level = near.into_iter().filter(|entry| heights.contains(&entry.data.height_m));
+        level.map(|entry| entry.data.outline_m.clone()).collect()
+    }
+
     /// Whether cars drive over some of a footprint, at a height.
     pub fn covers(&self, footprint: &Footprint, height_m: f64) -> bool {
         let (low_m, high_m) = footprint.bounds_m();
@@ -68,6 +78,14 @@ impl Driven {
                 && overlaps(footprint, &entry.data.outline_m)
         })
     }
+}
+
+/// Whether a place lies in a convex outline, given counter-clockwise.
+pub fn contains(outline_m: &[DVec2], place_m: DVec2) -> bool {
+    (0..outline_m.len()).all(|k| {
+        let along = outline_m[(k + 1) % outline_m.len()] - outline_m[k];
+        along.perp_dot(place_m - outline_m[k]) >= 0.0
+    })
 }
 
 /// What cars drive on between two cuts: lanes beside each other at once.

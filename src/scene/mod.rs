@@ -14,6 +14,7 @@ pub mod course;
 pub mod driven;
 pub mod terrain;
 pub mod streets;
+pub mod junctions;
 pub mod marks;
 pub mod buildings;
 pub mod trees;

@@ -1,7 +1,7 @@
 //! Streets as surfaces: carriageways, kerbs, side-walks, verges, medians, and the slopes and
 //! bridges that carry them.
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     footprint::Footprint,
@@ -87,7 +87,7 @@ impl Street<'_> {
             if is_raised {
                 self.raised(cuts, borders, paint, &surfaces, mesh);
             } else {
-                cuts.windows(2).for_each(|pair| strip(pair, borders, paint, mesh));
+                self.level(cuts, borders, paint, mesh);
             }
             first = last + 1;
         }
@@ -116,6 +116,16 @@ impl Street<'_> {
         };
         let surfaces = lanes.iter().map(|lane| of(lane.kind, lane.id > 0));
         surfaces.map(|(paint, is_raised)| Surface { paint, is_raised }).collect()
+    }
+
+    /// A strip at the height of the road; grass lies only where nobody drives.
+    fn level(&self, cuts: &[Cut], borders: [usize; 2], paint: Paint, mesh: &mut Mesh) {
+        if paint.material == Material::Asphalt {
+            return cuts.windows(2).for_each(|pair| strip(pair, borders, paint, mesh));
+        }
+        let mut pieces = Vec::new();
+        cuts.windows(2).for_each(|pair| self.add_free([&pair[0], &pair[1]], borders, &mut pieces));
+        pieces.iter().for_each(|pair| strip(pair, borders, paint, mesh));
     }
 
     /// A raised strip between two of the borders, with kerbs towards the carriageway; nothing
@@ -206,13 +216,30 @@ impl Street<'_> {
             mesh.ground_face(&outline, paint);
         };
         if drop_m[0].max(drop_m[1]) < BRIDGE_M {
+            let is_between = self.road.junction.is_some() && !is_raised;
+            let slope = if is_between { ASPHALT } else { GRASS };
             let down = drop_m.map(|drop_m| drop_m + INTO_GROUND_M);
-            let out = down.map(|down_m| SHOULDER_M + SLOPE * down_m);
-            face(
-                [(0, out[0], -down[0]), (1, out[1], -down[1]), (1, 0.0, top_m), (0, 0.0, top_m)],
-                GRASS,
-                mesh,
-            );
+            let mut foot =
+                [0, 1].map(|end| at(pair[end], SHOULDER_M + SLOPE * down[end], -down[end]));
+            let edge = [0, 1].map(|end| at(pair[end], 0.0, top_m));
+            // On the inside of tight bends slopes meet in a point, or are left out.
+            let looks_up = |corners: [DVec3; 3]| {
+                let [a, b, c] = corners.map(DVec3::truncate);
+                -side * (b - a).perp_dot(c - a) > 0.0
+            };
+            let is_fair =
+                looks_up([foot[0], foot[1], edge[1]]) && looks_up([foot[0], edge[1], edge[0]]);
+            if !is_fair {
+                foot = [0.5 * (foot[0] + foot[1]); 2];
+                if !looks_up([foot[0], edge[1], edge[0]]) {
+                    return;
+                }
+            }
+            let mut outline = [foot[0], foot[1], edge[1], edge[0]].map(|place| place.as_vec3());
+            if is_left {
+                outline.reverse();
+            }
+            mesh.ground_face(&outline, slope);
             return;
         }
         face(

@@ -9,7 +9,7 @@ use crate::{
     scene::{
         buildings,
         driven::Driven,
-        furniture, marks,
+        furniture, junctions, marks,
         mesh::{Mesh, Vertex},
         streets,
         terrain::{BLOCK_M, Terrain},
@@ -46,6 +46,7 @@ impl Surroundings {
         let mut mesh = Mesh::default();
         terrain.draw(&mut mesh);
         streets::draw(map, &terrain, &driven, &mut mesh);
+        junctions::draw(map, &terrain, &driven, &mut mesh);
         marks::draw(map, &driven, &mut mesh);
         for (number, thing) in scenery.things().iter().enumerate() {
             draw_thing(map, &terrain, thing, number, &mut mesh);
@@ -94,9 +95,12 @@ fn to_road(map: &RoadMap, thing: &Thing) -> DVec2 {
     left * (road_m - place_m).dot(left).signum()
 }
 
+/// Places of the corners of a tile by the bits of their coordinates.
+type Known = HashMap<[u32; 5], u32>;
+
 /// Triangles by tile; corners that are the same are one.
 fn tiles(mesh: &Mesh) -> Vec<Tile> {
-    let mut cells: BTreeMap<[i64; 2], (Mesh, HashMap<[u32; 5], u32>)> = BTreeMap::new();
+    let mut cells: BTreeMap<[i64; 2], (Mesh, Known)> = BTreeMap::new();
     for triangle in &mesh.triangles {
         let corners = triangle.corners.map(|corner| mesh.vertices[corner as usize]);
         let middle = corners.iter().map(|corner| corner.position_m).sum::<Vec3>() / 3.0;

@@ -15,8 +15,8 @@ const BARK: [[u8; 3]; 3] = [[92, 76, 60], [110, 98, 84], [78, 66, 56]];
 /// Radius of a crown, as a share of the tree's height; see [`Kind::Tree`].
 const CROWN: f32 = 0.25;
 
-/// Nothing of a crown that reaches over a road hangs lower, m.
-pub const HEADROOM_M: f32 = 4.7;
+/// Trees that are further from any lane are simpler, m.
+const FAR_M: f32 = 10.0;
 
 /// A tree on the ground at `ground_m`, with `free_m` around it to where cars drive.
 pub fn draw(thing: &Thing, number: usize, ground_m: f32, free_m: f32, mesh: &mut Mesh) {
@@ -28,7 +28,8 @@ pub fn draw(thing: &Thing, number: usize, ground_m: f32, free_m: f32, mesh: &mut
     let bark = paint(Material::Bark, BARK[number % BARK.len()]);
     // Where a road is near, crowns are slender.
     let radius_m = (CROWN * height_m).min(free_m.max(0.5));
-    let tree = Tree { foot_m, height_m, radius_m, number, leaves, bark };
+    let is_far = free_m > FAR_M;
+    let tree = Tree { foot_m, height_m, radius_m, number, is_far, leaves, bark };
     match number % 5 {
         0 => tree.conifer(mesh),
         1 => tree.poplar(mesh),
@@ -41,6 +42,8 @@ struct Tree {
     height_m: f32,
     radius_m: f32,
     number: usize,
+    /// From any road: simpler.
+    is_far: bool,
     leaves: Paint,
     bark: Paint,
 }
@@ -52,10 +55,11 @@ impl Tree {
 
     fn trunk(&self, share: f32, mesh: &mut Mesh) {
         let radius_m = (0.022 * self.height_m).clamp(0.08, 0.2);
+        let sides = if self.is_far { 3 } else { 5 };
         let ends = [self.foot_m - Vec3::Z * 0.4, self.up(share)];
         let rings = [
-            circle(ends[0], Vec3::Z, radius_m * 1.2, 5),
-            circle(ends[1], Vec3::Z, radius_m * 0.7, 5),
+            circle(ends[0], Vec3::Z, radius_m * 1.2, sides),
+            circle(ends[1], Vec3::Z, radius_m * 0.7, sides),
         ];
         mesh.loft(&rings, |_, _| self.bark);
     }
@@ -86,7 +90,10 @@ impl Tree {
         let out = Vec2::new(libm::cosf(turn), libm::sinf(turn)) * 0.4 * radius;
         let small = Vec3::new(0.6 * radius, 0.6 * radius, 0.34 * tall);
         self.ball(self.up(0.58) + out.extend(0.0), small, 2, self.leaves.shaded(0.92), mesh);
-        self.ball(self.up(0.72) - out.extend(0.0), 0.9 * small, 3, self.leaves.shaded(1.07), mesh);
+        if !self.is_far {
+            let place = self.up(0.72) - out.extend(0.0);
+            self.ball(place, 0.9 * small, 3, self.leaves.shaded(1.07), mesh);
+        }
     }
 
     /// Tall and slender.
@@ -95,23 +102,26 @@ impl Tree {
         let radius = 0.62 * self.radius_m;
         let half_m = 0.41 * self.height_m;
         self.ball(self.up(0.58), Vec3::new(radius, radius, half_m), 1, self.leaves, mesh);
+        if self.is_far {
+            return;
+        }
         let low = Vec3::new(0.9 * radius, 0.9 * radius, 0.55 * half_m);
         self.ball(self.up(0.42), low, 2, self.leaves.shaded(0.94), mesh);
     }
 
     /// Skirts of needles, one above the other.
     fn conifer(&self, mesh: &mut Mesh) {
-        const SIDES: usize = 7;
+        let sides = if self.is_far { 5 } else { 7 };
         self.trunk(0.3, mesh);
         let dark = self.leaves.shaded(0.8);
         for (layer, (low, high, width)) in
             [(0.16, 0.58, 1.0), (0.4, 0.8, 0.74), (0.62, 1.0, 0.48)].into_iter().enumerate()
         {
-            let rim = circle(self.up(low), Vec3::Z, width * self.radius_m, SIDES);
+            let rim = circle(self.up(low), Vec3::Z, width * self.radius_m, sides);
             let turned = 1.0 + 0.1 * self.vary(layer);
             let tip = self.up(high);
-            for k in 0..SIDES {
-                mesh.face(&[rim[k], rim[(k + 1) % SIDES], tip], dark.shaded(turned));
+            for k in 0..sides {
+                mesh.face(&[rim[k], rim[(k + 1) % sides], tip], dark.shaded(turned));
             }
             let below: Vec<Vec3> = rim.iter().rev().copied().collect();
             mesh.face(&below, dark.shaded(0.7));

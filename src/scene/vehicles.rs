@@ -94,7 +94,7 @@ fn coachwork(sections: &[Section], skin: Paint, mesh: &mut Mesh) {
         _ => skin,
     });
     mesh.face(&rear.band(2, false), if rear.then == Screen { GLASS } else { skin });
-    mesh.face(&front.band(2, true), skin);
+    mesh.face(&front.band(2, true), if front.then == Screen { GLASS } else { skin });
 }
 
 /// A wheel whose outer face lies at `y_m`; it is `width_m` wide towards the middle.
@@ -302,15 +302,18 @@ pub fn trucks() -> Vec<Mesh> {
 
 fn truck_end(mesh: &mut Mesh) {
     mesh.cuboid(Vec3::new(-4.06, -1.1, 0.5), Vec3::new(-3.96, 1.1, 0.62), STEEL);
+    // Its rear face is the panel with the lamps.
     let (low, high) = (Vec3::new(-4.08, -1.18, 0.66), Vec3::new(-3.9, 1.18, 0.96));
-    mesh.cuboid(low, high, TRIM);
-    let x = low.x - 0.01;
     let corners = [
-        Vec3::new(x, high.y, low.z + 0.04),
-        Vec3::new(x, low.y, low.z + 0.04),
-        Vec3::new(x, low.y, high.z - 0.04),
-        Vec3::new(x, high.y, high.z - 0.04),
+        Vec3::new(low.x, high.y, low.z),
+        Vec3::new(low.x, low.y, low.z),
+        Vec3::new(low.x, low.y, high.z),
+        Vec3::new(low.x, high.y, high.z),
     ];
+    let rear: Vec<Vec3> = [0, 3, 2, 1].map(|corner: usize| corners[corner]).to_vec();
+    let front: Vec<Vec3> = rear.iter().map(|corner| Vec3 { x: high.x, ..*corner }).collect();
+    mesh.loft(&[rear, front.clone()], |_, _| TRIM);
+    mesh.face(&front, TRIM);
     mesh.panel(corners, &[0.1, 0.2, 0.42, 0.58, 0.8, 0.9], &[], |column, _| match column {
         0 | 6 => TAIL,
         1 | 5 => BRAKE,
@@ -356,7 +359,7 @@ pub fn buses() -> Vec<Mesh> {
             let low = |top: f32| [*floor_m, 0.8, *sill_m + 0.05, top];
             let (wall, half) = ([1.2, 1.25, 1.24, 1.14], [1.18, 1.22, 1.21, 1.1]);
             let mut sections =
-                vec![section(-5.6, low(2.96), half, Solid), section(-5.5, low(3.06), wall, Solid)];
+                vec![section(-5.6, low(2.96), half, Screen), section(-5.5, low(3.06), wall, Solid)];
             let pitch_m = 1.72;
             for window in 0..6 {
                 let x_m = -5.2 + pitch_m * window as f32;
@@ -366,23 +369,12 @@ pub fn buses() -> Vec<Mesh> {
             sections.extend([
                 section(5.15, low(3.08), wall, Cabin),
                 section(5.5, low(3.04), wall, Screen),
-                section(5.6, [*floor_m, 0.75, *sill_m, 2.75], half, Solid),
+                section(5.6, [*floor_m, 0.75, *sill_m, 2.75], half, Screen),
             ]);
             let mut mesh = Mesh::default();
             coachwork(&sections, COACHWORK, &mut mesh);
-            bus_ends(*sill_m, &mut mesh);
             wheels(&[-2.9, 2.92], 1.25, 0.5, 0.3, &mut mesh);
             mesh
         })
         .collect()
-}
-
-/// The panes at both ends of a bus, right before its walls.
-fn bus_ends(sill_m: f32, mesh: &mut Mesh) {
-    let pane = |x: f32, left: f32, top_m: f32| {
-        let at = |y: f32, z: f32| Vec3::new(x, y, z);
-        [at(left, sill_m + 0.12), at(-left, sill_m + 0.12), at(-left, top_m), at(left, top_m)]
-    };
-    mesh.face(&pane(5.61, -1.1, 2.7), GLASS);
-    mesh.face(&pane(-5.61, 1.0, 2.5), GLASS);
 }

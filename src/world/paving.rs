@@ -9,6 +9,7 @@ use crate::{
         opendrive::{LaneKind, Road},
         road_map::RoadMap,
     },
+    towns::scenery::furniture::KERB_HEIGHT_M,
     world::streets::{Course, Lane, Onward, STEP_M, Streets, Walk, WalkId},
 };
 
@@ -116,7 +117,7 @@ fn side_walks(index: usize, road: &Road, section: usize, strips: &mut Vec<Strip>
         let points = along(from_m, to_m, |s_m| road.centre(section, place, s_m).position_m);
         let width_m = road.centre(section, place, (from_m + to_m) / 2.0).width_m;
         let half_width_m = (width_m / 2.0 - 0.3).max(0.1);
-        strips.extend(strip(index, lane.id > 0, &points, half_width_m));
+        strips.extend(strip(index, lane.id > 0, &points, half_width_m, KERB_HEIGHT_M));
     }
 }
 
@@ -139,15 +140,21 @@ fn verges(index: usize, road: &Road, section: usize, strips: &mut Vec<Strip>) {
             };
             road.place(s_m, t_m)
         });
-        strips.extend(strip(index, is_left, &points, VERGE_HALF_M));
+        strips.extend(strip(index, is_left, &points, VERGE_HALF_M, 0.0));
     }
 }
 
-fn strip(road: usize, is_left: bool, points: &[DVec3], half_width_m: f64) -> Option<Strip> {
+fn strip(
+    road: usize,
+    is_left: bool,
+    points: &[DVec3],
+    half_width_m: f64,
+    kerb_m: f64,
+) -> Option<Strip> {
     let course = Course::through(points);
     let is_long = course.length_m() >= SHORTEST_M;
     let onward = [Vec::new(), Vec::new()];
-    let walk = Walk { course, half_width_m, onward, opposite: None };
+    let walk = Walk { course, half_width_m, kerb_m, onward, opposite: None };
     is_long.then_some(Strip { walk, road, is_left })
 }
 

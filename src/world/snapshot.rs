@@ -80,7 +80,7 @@ pub fn walker_states(walkers: &Walkers) -> Vec<WalkerState> {
         id: walker.id,
         kind: walker.kind,
         footprint: walker.footprint(),
-        ground_m: walker.height_m,
+        ground_m: walker.ground_m(),
         velocity_mps: walker.velocity_mps,
         is_jaywalking: walker.is_jaywalking,
         is_crossing: walker.is_crossing(),

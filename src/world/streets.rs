@@ -201,6 +201,8 @@ pub struct Walk {
     pub course: Course,
     /// How far from the line people walk, m.
     pub half_width_m: f64,
+    /// Height of the side-walk above the street, m.
+    pub kerb_m: f64,
     /// Where one can go on from its start and from its end.
     pub onward: [Vec<Onward>; 2],
     /// The walk on the other side of the street.

@@ -10,7 +10,7 @@ use crate::{
     world::{
         kind::WalkerKind,
         reservation::ActorId,
-        streets::{LEVEL_M, Streets, WalkId},
+        streets::{LEVEL_M, Onward, Streets, WalkId},
         traffic::{Hazard, STEP_S},
     },
 };
@@ -46,8 +46,10 @@ pub struct Walker {
     /// Picks colours, in [0, 1).
     pub colour: f64,
     pub position_m: DVec2,
-    /// Of the ground below.
+    /// Of the street below or beside.
     pub height_m: f64,
+    /// Height of the side-walk that is walked on, m.
+    kerb_m: f64,
     pub velocity_mps: DVec2,
     /// Unit vector that the body faces.
     pub facing: DVec2,
@@ -70,7 +72,7 @@ enum Activity {
         to: Landing,
         since_s: f64,
     },
-    /// On the way across, from kerb to kerb.
+    /// On the way across, from kerb to kerb, or on to the next walk.
     Crossing {
         to: Landing,
     },
@@ -83,6 +85,8 @@ struct Landing {
     s_m: f64,
     backwards: bool,
     position_m: DVec2,
+    /// A street lies between.
+    crosses: bool,
 }
 
 /// Steps out on the street, counted.
@@ -166,6 +170,7 @@ impl Walker {
             colour: noise.uniform(0.0, 1.0),
             position_m: DVec2::ZERO,
             height_m: 0.0,
+            kerb_m: 0.0,
             velocity_mps: DVec2::ZERO,
             facing: DVec2::X,
             is_jaywalking: false,
@@ -190,10 +195,19 @@ impl Walker {
         matches!(self.activity, Activity::Crossing { .. })
     }
 
+    /// Height of what the feet stand on: the side-walk, or the street, m.
+    pub fn ground_m(&self) -> f64 {
+        match self.activity {
+            Activity::Crossing { to } if to.crosses => self.height_m,
+            _ => self.height_m + self.kerb_m,
+        }
+    }
+
     fn stand_on_walk(&mut self, streets: &Streets) {
         let spot = streets.walks[self.walk].course.at(self.s_m);
         self.position_m = spot.position_m + spot.forward.perp() * self.aside_m;
         self.height_m = spot.height_m;
+        self.kerb_m = streets.walks[self.walk].kerb_m;
         self.facing = if self.backwards { -spot.forward } else { spot.forward };
     }
 
@@ -266,7 +280,8 @@ impl Walker {
         let spot = walk.course.at(s_m);
         let aside_m = self.aside_m.clamp(-walk.half_width_m, walk.half_width_m);
         let position_m = spot.position_m + spot.forward.perp() * aside_m;
-        let to = Landing { walk: onward.walk, s_m, backwards: onward.at_end, position_m };
+        let Onward { walk, at_end: backwards, crosses } = onward;
+        let to = Landing { walk, s_m, backwards, position_m, crosses };
         self.is_jaywalking = false;
         self.activity = match onward.crosses {
             true => Activity::Waiting { to, since_s: 0.0 },
@@ -282,8 +297,8 @@ impl Walker {
         let spot = walk.course.at(s_m);
         let width_m = spot.position_m.distance(self.position_m);
         let is_beside = s_m > 0.5 && s_m < walk.course.length_m() - 0.5;
-        let to =
-            Landing { walk: opposite, s_m, backwards: self.backwards, position_m: spot.position_m };
+        let (backwards, position_m) = (self.backwards, spot.position_m);
+        let to = Landing { walk: opposite, s_m, backwards, position_m, crosses: true };
         (is_beside && width_m < WIDEST_M).then_some(to)
     }
 

@@ -57,6 +57,7 @@ mod world;
 mod encoding;
 mod towns;
 mod scenery;
+mod scene;
 mod flow;
 mod recording;
 mod replay;
