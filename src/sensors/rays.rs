@@ -53,7 +53,7 @@ impl Standing {
             add(&tile.mesh, &Affine3A::IDENTITY, &mut corners);
             surfaces.extend(tile.mesh.triangles.iter().map(|triangle| Surface::of(triangle, None)));
         }
-        Standing(Tree::new(&corners, &surfaces, BvhBuildParams::medium_build()))
+        Standing(Tree::new(&corners, &surfaces, BvhBuildParams::slow_build()))
     }
 }
 
@@ -84,7 +84,7 @@ impl<'a> Reach<'a> {
             let triangles = body.mesh.triangles.iter();
             surfaces.extend(triangles.map(|triangle| Surface::of(triangle, Some((index, body)))));
         }
-        let moving = Tree::new(&corners, &surfaces, BvhBuildParams::very_fast_build());
+        let moving = Tree::new(&corners, &surfaces, BvhBuildParams::fastest_build());
         Reach { standing, bodies: &instant.bodies, moving }
     }
 

