@@ -11,3 +11,4 @@ mkdir -p docs
 for town in Town03 Town07; do
     "$sim" map "$maps/$town.xodr" --picture "docs/$town.png" --scenery 0
 done
+"$sim" sheet --town Town03 --seed 2 --out docs/weather.png

@@ -23,3 +23,4 @@ pub mod foxglove_messages;
 pub mod ros2_messages;
 pub mod record;
 pub mod collection;
+pub mod sheet;

@@ -62,6 +62,7 @@ mod flow;
 mod recording;
 mod replay;
 mod ranging;
+mod camera;
 mod map_fixtures;
 mod map_geometry;
 mod map_traps;

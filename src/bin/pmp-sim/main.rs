@@ -3,6 +3,7 @@
 mod drill;
 mod map;
 mod record;
+mod sheet;
 mod towns;
 mod traffic;
 
@@ -26,6 +27,7 @@ enum Command {
     Towns(towns::Towns),
     Traffic(traffic::Traffic),
     Drill(drill::Drill),
+    Sheet(sheet::Sheet),
 }
 
 const EXAMPLES: &str = "\
@@ -35,6 +37,7 @@ Examples:
   pmp-sim map maps/Town03.xodr --picture town3.png       what one looks like
   pmp-sim traffic maps/Town03.xodr                       an hour of its traffic
   pmp-sim drill --town Town03 --traffic dense            the expert drives there
+  pmp-sim sheet --out weather.png                        the camera under 16 skies
 
 Exit codes: 0 done; 1 error; 2 bad usage";
 
@@ -46,5 +49,6 @@ fn main() -> ExitCode {
         Command::Towns(args) => towns::run(&args),
         Command::Traffic(args) => traffic::run(args),
         Command::Drill(args) => drill::run(&args),
+        Command::Sheet(args) => sheet::run(&args),
     })
 }

@@ -1,5 +1,7 @@
 //! Curves that shading is made of.
 
+use glam::Vec3A;
+
 /// 0 below `from`, 1 above `to`, smooth in between.
 #[inline]
 pub fn smooth(from: f32, to: f32, value: f32) -> f32 {
@@ -24,16 +26,29 @@ pub fn floor(value: f32) -> i32 {
     towards_zero - i32::from((towards_zero as f32) > value)
 }
 
-/// How much of a stretch `footprint` wide around `place` is covered by bars of a width, one at the
-/// start of each period.
-#[inline]
-pub fn bars(place: f32, period: f32, width: f32, footprint: f32) -> f32 {
-    let covered = |to: f32| {
-        let whole = floor(to / period) as f32;
-        whole * width + (to - whole * period).min(width)
-    };
-    let half = 0.5 * footprint.max(1e-3);
-    ((covered(place + half) - covered(place - half)) / (2.0 * half)).clamp(0.0, 1.0)
+/// Bars of one width, one at the start of each period.
+#[derive(Clone, Copy, Debug)]
+pub struct Bars {
+    pub width: f32,
+    period: f32,
+    per_period: f32,
+}
+
+impl Bars {
+    pub const fn new(width: f32, period: f32) -> Bars {
+        Bars { width, period, per_period: 1.0 / period }
+    }
+
+    /// Share of a stretch `footprint` wide around `place` that bars cover.
+    #[inline]
+    pub fn share(&self, place: f32, footprint: f32) -> f32 {
+        let covered = |to: f32| {
+            let whole = floor(to * self.per_period) as f32;
+            whole * self.width + (to - whole * self.period).min(self.width)
+        };
+        let half = 0.5 * footprint.max(1e-3);
+        ((covered(place + half) - covered(place - half)) / (2.0 * half)).clamp(0.0, 1.0)
+    }
 }
 
 /// A number that looks drawn by lot, in [0, 1), for a place on a grid.
@@ -47,9 +62,11 @@ pub fn lot(x: i32, y: i32, of: u32) -> f32 {
     (mixed >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Linear light of a colour in sRGB, in [0, 1]; gamma 2.2.
-pub fn linear(colour: [u8; 3]) -> glam::Vec3A {
-    glam::Vec3A::from_array(colour.map(|value| (f32::from(value) / 255.0).powf(2.2)))
+/// Linear light of a colour in sRGB, in [0, 1]; a cubic, to 1 % of white.
+#[inline]
+pub fn linear(colour: [u8; 3]) -> Vec3A {
+    let colour = Vec3A::from_array(colour.map(f32::from)) * (1.0 / 255.0);
+    colour * (colour * (colour * 0.305 + 0.682) + 0.0125)
 }
 
 #[cfg(test)]
@@ -66,8 +83,19 @@ mod tests {
 
     #[test]
     fn wide_footprints_see_the_mean_of_bars() {
-        assert!((bars(7.3, 2.0, 0.5, 400.0) - 0.25).abs() < 2e-3);
-        assert_eq!(bars(0.25, 2.0, 0.5, 0.01), 1.0);
-        assert_eq!(bars(-0.25, 2.0, 0.5, 0.01), 0.0);
+        let bars = Bars::new(0.5, 2.0);
+        assert!((bars.share(7.3, 400.0) - 0.25).abs() < 2e-3);
+        assert_eq!(bars.share(0.25, 0.01), 1.0);
+        assert_eq!(bars.share(-0.25, 0.01), 0.0);
+    }
+
+    #[test]
+    fn the_cubic_is_close_to_the_curve_of_srgb() {
+        for value in 0..=255_u8 {
+            let share = f32::from(value) / 255.0;
+            let exact =
+                if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) };
+            assert!((linear([value; 3]).x - exact).abs() < 0.01, "{value}");
+        }
     }
 }

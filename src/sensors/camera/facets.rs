@@ -73,7 +73,9 @@ impl Facets {
 
     fn draw_body(&mut self, view: &View, body: &Body, index: u32, onto: &mut Visibility) {
         let Affine3A { matrix3, translation } = body.world_from_body;
-        if !view.may_see_ball(translation.into(), reach_m(&body.mesh)) {
+        let growth =
+            matrix3.x_axis.length().max(matrix3.y_axis.length()).max(matrix3.z_axis.length());
+        if !view.may_see_ball(translation.into(), growth * reach_m(&body.mesh)) {
             return;
         }
         let (rotation, shift) = view.camera_from_body(&body.world_from_body);

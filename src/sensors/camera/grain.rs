@@ -6,13 +6,13 @@ use crate::{
 };
 
 /// Texels along a side of the finest level, a power of two.
-const SIDE: usize = 256;
-const LEVELS: usize = 8;
+const SIDE: usize = 128;
+const LEVELS: usize = 7;
 
 /// Values in [-1, 1] that repeat every [`SIDE`] texels, each level half as fine as the one before.
 #[derive(Clone, Debug)]
 pub struct Grain {
-    levels: Vec<Vec<i8>>,
+    levels: Vec<Vec<f32>>,
 }
 
 impl Default for Grain {
@@ -56,10 +56,8 @@ impl Grain {
             let coarser = coarser.collect();
             levels.push(coarser);
         }
-        let rounded = |level: &Vec<f32>| {
-            level.iter().map(|value| (value.clamp(-1.0, 1.0) * 127.0) as i8).collect()
-        };
-        Grain { levels: levels.iter().map(rounded).collect() }
+        levels.iter_mut().flatten().for_each(|value| *value = value.clamp(-1.0, 1.0));
+        Grain { levels }
     }
 
     /// The value at a place, both in texels, as a pixel sees it that covers `footprint` texels.
@@ -75,10 +73,10 @@ impl Grain {
         let mask = (1 << shift) - 1;
         let (left, top) = (left as usize & mask, top as usize & mask);
         let (right, bottom) = ((left + 1) & mask, (top + 1) & mask);
-        let at = |x: usize, y: usize| f32::from(level[(y << shift) + x]);
+        let at = |x: usize, y: usize| level[(y << shift) + x];
         let above = at(left, top) + (at(right, top) - at(left, top)) * across;
         let below = at(left, bottom) + (at(right, bottom) - at(left, bottom)) * across;
-        (above + (below - above) * down) * (1.0 / 127.0)
+        above + (below - above) * down
     }
 }
 

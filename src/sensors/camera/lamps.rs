@@ -219,7 +219,7 @@ pub struct Beam {
 impl Beam {
     /// `ego` are the axes of the ego frame in the world frame, and its origin from the eye.
     pub fn new(light: &Light, [forward, left, up]: [Vec3A; 3], origin_m: Vec3A) -> Beam {
-        let strength = if light.exposure < 2.0 { 0.0 } else { 15.0 * light.vehicle_lamps };
+        let strength = if light.exposure < 2.0 { 0.0 } else { 26.0 * light.vehicle_lamps };
         Beam { lamp_m: origin_m + forward * 2.4 + up * 0.65, forward, left, up, strength }
     }
 
@@ -234,7 +234,7 @@ impl Beam {
         // Cut off above; less so on the right, away from those who come.
         let cut = 0.01 - 0.05 * aside.clamp(-0.5, 0.5);
         let below = smooth(cut + 0.05, cut - 0.02, rise);
-        spread * spread * (0.1 + 0.9 * below)
+        spread * spread * (0.14 + 0.86 * below)
     }
 
     /// Light on a surface with a normal, at a place from the eye; linear.
@@ -258,8 +258,8 @@ impl Beam {
         if self.strength == 0.0 {
             return 0.0;
         }
-        let ahead = direction.dot(self.forward);
-        let rise = direction.dot(self.up) - 0.02 * ahead;
-        self.strength * self.pattern(ahead, direction.dot(self.left), rise * 0.35)
+        let (aside, rise) = (direction.dot(self.left), direction.dot(self.up));
+        let spread = 1.0 / (1.0 + 4.0 * aside * aside + 14.0 * rise * rise);
+        if direction.dot(self.forward) > 0.0 { self.strength * spread * spread } else { 0.0 }
     }
 }

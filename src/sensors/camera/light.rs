@@ -131,10 +131,10 @@ impl Light {
             },
             Illumination::Dark => Light {
                 sun: Vec3A::ZERO,
-                above: Vec3A::new(0.0006, 0.0007, 0.001),
+                above: Vec3A::new(0.0004, 0.0005, 0.0007),
                 below: Vec3A::splat(0.0002),
                 zenith: Vec3A::new(0.0002, 0.0003, 0.0006),
-                horizon: Vec3A::new(0.0006, 0.0007, 0.0011),
+                horizon: Vec3A::new(0.0004, 0.0005, 0.0008),
                 glare: Vec3A::ZERO,
                 vehicle_lamps: 1.0,
                 exposure: 5.0,

@@ -35,7 +35,7 @@ pub fn draw(
         let strength = (0.1 + 0.22 * near) * (0.5 + 0.5 * light.rain);
         let lean = wind + draw(noise, -0.03, 0.03);
         let direction = view.ray(Vec2::new(x, y)).normalize();
-        let lamp = beam.veil(Vec3A::from(direction)) * 0.006;
+        let lamp = beam.veil(Vec3A::from(direction)) * 0.0015;
         let colour = grey + Vec3A::splat(lamp);
         for step in 0..length as usize {
             let (at_x, at_y) = (x + lean * step as f32, y + step as f32);

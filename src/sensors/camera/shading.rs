@@ -15,6 +15,9 @@ use crate::sensors::camera::{
     view::View,
 };
 
+/// Share of the light of the own lamps that drops throw back into the camera.
+const VEIL: f32 = 0.009;
+
 /// Everything that lights a picture.
 pub struct Lighting<'a> {
     pub light: &'a Light,
@@ -84,7 +87,7 @@ impl Lighting<'_> {
     }
 
     fn sky(&self, direction: Vec3A) -> Vec3A {
-        let veil = self.beam.veil(direction) * self.light.haze_per_m * 0.12;
+        let veil = self.veil(direction);
         sky::radiance(self.light, self.grain, direction, self.drift) + Vec3A::splat(veil)
     }
 
@@ -120,7 +123,7 @@ impl Lighting<'_> {
         let direction = from_eye_m / distance_m;
         let facing = (-direction.dot(lit.normal)).max(0.02);
         let footprint_m = depth_m / (view.focal_px.x * facing.sqrt());
-        let texture_m = facet.texture.at_m(Vec3::from(from_eye_m));
+        let texture_m = || facet.texture.at_m(Vec3::from(from_eye_m));
         let look = lit.surface.look(self.grain, place_m, texture_m, footprint_m);
 
         let mut arriving = lit.ambient * openness;
@@ -152,13 +155,22 @@ impl Lighting<'_> {
         self.haze(colour, direction, distance_m)
     }
 
+    /// What rain throws back of the light of the own head lamps.
+    #[inline]
+    fn veil(&self, direction: Vec3A) -> f32 {
+        if self.light.rain == 0.0 {
+            return 0.0;
+        }
+        self.beam.veil(direction) * self.light.haze_per_m * VEIL
+    }
+
     /// What is left of a colour, and what the air adds on the way.
     #[inline]
     fn haze(&self, colour: Vec3A, direction: Vec3A, distance_m: f32) -> Vec3A {
         let left = fade(self.light.haze_per_m * distance_m);
         // Rain in the beam of the head lamps: most of it comes from the first metres.
-        let veil = self.beam.veil(direction) * self.light.haze_per_m * 0.12;
-        let near = fade(distance_m * 0.12);
+        let veil = self.veil(direction);
+        let near = fade(distance_m * 0.3);
         colour * left + self.light.horizon * (1.0 - left) + Vec3A::splat(veil * (1.0 - near))
     }
 }

@@ -3,7 +3,11 @@
 use glam::{Mat3, Vec2, Vec3, Vec3A};
 
 use crate::{
-    scene::{instant::Instant, mesh::Mesh, surroundings::Surroundings},
+    scene::{
+        instant::Instant,
+        mesh::{Material, Mesh},
+        surroundings::Surroundings,
+    },
     sensors::camera::{
         curves::floor,
         light::{Light, luminance},
@@ -16,7 +20,7 @@ const SIDE: usize = 512;
 const TEXEL_M: f32 = 0.18;
 
 /// What stands further from the middle of the map throws no shadow onto it, m.
-const CASTERS_M: f32 = 130.0;
+const CASTERS_M: f32 = 100.0;
 
 /// What reaches further from its origin does so outside the map, m.
 const BODY_M: f32 = 7.0;
@@ -82,6 +86,12 @@ impl Area {
     }
 }
 
+/// Whether it stands up from the ground.
+fn throws_shadow(material: Material) -> bool {
+    use Material::{Asphalt, Concrete, Grass, Marking};
+    !matches!(material, Asphalt | Marking | Concrete | Grass)
+}
+
 impl Shadows {
     /// Look from the sun at what lies around `middle_m` (world frame).
     pub fn draw(
@@ -111,7 +121,7 @@ impl Shadows {
     fn draw_mesh(&mut self, mesh: &Mesh, place_px: &dyn Fn(Vec3) -> Vec3) {
         self.places_px.clear();
         self.places_px.extend(mesh.vertices.iter().map(|vertex| place_px(vertex.position_m)));
-        for triangle in &mesh.triangles {
+        for triangle in mesh.triangles.iter().filter(|triangle| throws_shadow(triangle.material)) {
             let corners = triangle.corners.map(|corner| self.places_px[corner as usize]);
             self.map.draw_flat(corners);
         }

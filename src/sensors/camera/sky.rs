@@ -24,6 +24,9 @@ pub fn radiance(light: &Light, grain: &Grain, direction: Vec3A, drift: Vec2) -> 
         // Thick clouds are darker below.
         colour = colour.lerp(white * (1.0 - 0.35 * light.clouds * billow), share);
     }
+    if light.glare == Vec3A::ZERO {
+        return colour;
+    }
     let towards_sun = direction.dot(light.sun_direction).max(0.0);
     let near = towards_sun * towards_sun * towards_sun * towards_sun;
     let near = near * near;

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3A};
 use crate::{
     scene::mesh::Material,
     sensors::camera::{
-        curves::{bars, floor, linear, lot, smooth},
+        curves::{Bars, floor, linear, lot, smooth},
         facets::Facet,
         grain::Grain,
     },
@@ -13,6 +13,13 @@ use crate::{
 
 /// From floor to floor, m.
 const STOREY_M: f32 = 3.1;
+
+/// Joints between the slabs of side-walks, and shadows between courses of tiles, m.
+const JOINTS: Bars = Bars::new(0.03, 1.2);
+const COURSES: Bars = Bars::new(0.05, 0.22);
+
+/// Breadth of window frames, m.
+const FRAME_M: f32 = 0.09;
 
 /// How a place on a surface meets light.
 #[derive(Clone, Copy, Debug)]
@@ -39,8 +46,42 @@ pub struct Surface {
 struct Wall {
     number: u32,
     bay_m: f32,
-    window_m: Vec2,
     has_shops: bool,
+    windows: Windows,
+    shops: Windows,
+}
+
+/// Windows in bays and storeys: where glass is, and where glass and frames are.
+#[derive(Clone, Copy, Debug)]
+struct Windows {
+    margin_m: f32,
+    sill_m: f32,
+    glass: [Bars; 2],
+    framed: [Bars; 2],
+}
+
+impl Windows {
+    fn new(bay_m: f32, size_m: Vec2, sill_m: f32) -> Windows {
+        let outer_m = size_m + 2.0 * FRAME_M;
+        let bars = |size_m: Vec2| [Bars::new(size_m.x, bay_m), Bars::new(size_m.y, STOREY_M)];
+        let margin_m = 0.5 * (bay_m - size_m.x);
+        Windows { margin_m, sill_m, glass: bars(size_m), framed: bars(outer_m) }
+    }
+
+    /// Shares of a pixel that show glass, and frames.
+    #[inline]
+    fn shares(&self, along_m: f32, up_m: f32, footprint_m: f32) -> [f32; 2] {
+        let (along_m, up_m) = (along_m - self.margin_m, up_m - self.sill_m);
+        let [across, upward] = &self.framed;
+        let framed = across.share(along_m + FRAME_M, footprint_m)
+            * upward.share(up_m + FRAME_M, footprint_m);
+        if framed == 0.0 {
+            return [0.0; 2];
+        }
+        let [across, upward] = &self.glass;
+        let glass = across.share(along_m, footprint_m) * upward.share(up_m, footprint_m);
+        [glass, (framed - glass).max(0.0)]
+    }
 }
 
 impl Surface {
@@ -48,20 +89,29 @@ impl Surface {
         let [r, g, b] = facet.colour.map(u32::from);
         let number = r << 16 | g << 8 | b;
         let draw = |of: i32| lot(of, 0, number);
+        let bay_m = 2.3 + 1.0 * draw(1);
+        let window_m = Vec2::new(1.05 + 0.35 * draw(2), 1.35 + 0.35 * draw(3));
         let wall = Wall {
             number,
-            bay_m: 2.3 + 1.0 * draw(1),
-            window_m: Vec2::new(1.05 + 0.35 * draw(2), 1.35 + 0.35 * draw(3)),
             has_shops: draw(4) < 0.3,
+            windows: Windows::new(bay_m, window_m, 0.95),
+            shops: Windows::new(bay_m, Vec2::new(bay_m - 0.35, 2.2), 0.35),
+            bay_m,
         };
         let is_roof = facet.normal.z > 0.15;
         Surface { material: facet.material, colour: linear(facet.colour), wall, is_roof }
     }
 
-    /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` are
+    /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` gives
     /// coordinates on a wall.
     #[inline]
-    pub fn look(&self, grain: &Grain, place_m: Vec3A, texture_m: Vec2, footprint_m: f32) -> Look {
+    pub fn look(
+        &self,
+        grain: &Grain,
+        place_m: Vec3A,
+        texture_m: impl Fn() -> Vec2,
+        footprint_m: f32,
+    ) -> Look {
         let at = |texel_m: f32| {
             let scale = 1.0 / texel_m;
             grain.at(place_m.x * scale, place_m.y * scale, footprint_m * scale)
@@ -80,12 +130,8 @@ impl Surface {
                 plain(self.colour * (0.92 + 0.1 * fine - 0.3 * smooth(0.25, 0.6, broad)))
             }
             Material::Concrete => {
-                let joints = bars(place_m.x, 1.2, 0.03, footprint_m).max(bars(
-                    place_m.y,
-                    1.2,
-                    0.03,
-                    footprint_m,
-                ));
+                let joints =
+                    JOINTS.share(place_m.x, footprint_m).max(JOINTS.share(place_m.y, footprint_m));
                 let shade = 1.0 + 0.14 * at(0.03) + 0.14 * at(0.3) - 0.4 * joints;
                 plain(self.colour * shade)
             }
@@ -95,9 +141,9 @@ impl Surface {
                 let tint = Vec3A::ONE.lerp(dry, smooth(-0.3, 0.5, broad));
                 plain(self.colour * tint * (1.0 + 0.5 * fine + 0.25 * broad))
             }
-            Material::Facade => self.wall(grain, texture_m, footprint_m),
+            Material::Facade => self.wall(grain, texture_m(), footprint_m),
             Material::Plaster if self.is_roof => {
-                let courses = bars(place_m.z, 0.22, 0.05, footprint_m);
+                let courses = COURSES.share(place_m.z, footprint_m);
                 plain(self.colour * (1.0 - 0.3 * courses + 0.2 * at(0.2)))
             }
             Material::Foliage => {
@@ -117,30 +163,18 @@ impl Surface {
 
     /// Windows in bays and storeys, each with its own blinds.
     fn wall(&self, grain: &Grain, texture_m: Vec2, footprint_m: f32) -> Look {
-        let Wall { number, bay_m, window_m, has_shops } = self.wall;
+        let Wall { number, bay_m, has_shops, windows, shops } = &self.wall;
         let (along, up) = (texture_m.x, texture_m.y);
-        let (bay, storey) = (floor(along / bay_m), floor(up / STOREY_M));
-        let is_shop = has_shops && storey == 0;
-        let size_m = if is_shop { Vec2::new(bay_m - 0.35, 2.2) } else { window_m };
-        let sill_m = if is_shop { 0.35 } else { 0.95 };
-        let margin_m = 0.5 * (bay_m - size_m.x);
-        let pane = |grown_m: f32| {
-            let across =
-                bars(along - margin_m + grown_m, bay_m, size_m.x + 2.0 * grown_m, footprint_m);
-            let upward =
-                bars(up - sill_m + grown_m, STOREY_M, size_m.y + 2.0 * grown_m, footprint_m);
-            across * upward
-        };
-        let window = pane(0.0);
-        let frame = (pane(0.09) - window).max(0.0);
-        let draw = lot(bay, storey, number);
+        let (bay, storey) = (floor(along / bay_m), floor(up * (1.0 / STOREY_M)));
+        let kind = if *has_shops && storey == 0 { shops } else { windows };
+        let [window, frame] = kind.shares(along, up, footprint_m);
+        let draw = lot(bay, storey, *number);
         // Far away the windows of a wall run together, and so does their light.
         let near = smooth(2.5, 1.0, footprint_m);
         let lights = if draw < 0.28 { 0.5 + draw } else { 0.0 };
         let lit = window * (near * lights + (1.0 - near) * 0.15);
-        let stains = grain.at(along * 2.0, up * 0.7, 2.0 * footprint_m)
-            + 0.6 * grain.at(along * 14.0, up * 14.0, 14.0 * footprint_m);
-        let plaster = self.colour * (1.0 + 0.1 * stains);
+        let stains = grain.at(along * 7.0, up * 3.0, 7.0 * footprint_m);
+        let plaster = self.colour * (1.0 + 0.13 * stains);
         let blind = if draw > 0.7 { 0.35 } else { 0.03 + 0.04 * draw };
         let pane_colour = Vec3A::new(0.9, 1.0, 1.1) * blind;
         let light_frame = Vec3A::splat(0.62).lerp(self.colour, 0.3);

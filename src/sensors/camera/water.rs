@@ -1,6 +1,6 @@
 //! Wet ground: a film that mirrors what stands behind it, smeared, and puddles that mirror it clearly.
 
-use glam::Vec3A;
+use glam::{Vec2, Vec3, Vec3A};
 
 use crate::{
     scene::mesh::Material,
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Places along a mirrored ray that are looked at.
-const STEPS: usize = 7;
+const STEPS: usize = 6;
 
 /// A camera is level if its axes are within this of those of the world.
 const LEVEL: f32 = 0.03;
@@ -41,14 +41,22 @@ impl Water<'_> {
         let is_level = axes.x_axis.z.abs() < LEVEL && axes.z_axis.z.abs() < LEVEL;
         for row in 0..view.height {
             let start = row * view.width;
+            let first = view.ray(Vec2::new(0.5, row as f32 + 0.5));
+            let across = axes.x_axis / view.focal_px.x;
             let mut known = (NOTHING, false);
+            let mut mirrored = None;
             for column in 0..view.width {
                 let facet = self.visibility.facet[start + column];
                 if facet != known.0 {
                     known = (facet, self.is_wet_ground(facet));
                 }
                 if known.1 {
-                    self.mirror(row, column, is_level, radiance);
+                    let ray = first + across * column as f32;
+                    // Neighbours mirror nearly the same: the water is not smooth enough to tell.
+                    let before = mirrored.filter(|_| column % 2 == 1);
+                    mirrored = self.mirror(row, column, ray, before, is_level, radiance);
+                } else {
+                    mirrored = None;
                 }
             }
         }
@@ -65,44 +73,50 @@ impl Water<'_> {
         }
     }
 
+    /// Add what a pixel mirrors (`before`, if that is known), and return it.
     #[inline]
-    fn mirror(&self, row: usize, column: usize, is_level: bool, radiance: &mut [Vec3A]) {
+    fn mirror(
+        &self,
+        row: usize,
+        column: usize,
+        ray: Vec3,
+        before: Option<Vec3A>,
+        is_level: bool,
+        radiance: &mut [Vec3A],
+    ) -> Option<Vec3A> {
         let (view, light) = (self.view, self.light);
         let place = row * view.width + column;
         let nearness = self.visibility.nearness[place];
-        let ray = view.ray(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
         let from_eye_m = ray / nearness;
         let distance_m = from_eye_m.length();
         let above_m = -from_eye_m.z;
         if above_m < 0.1 {
-            return;
+            return None;
         }
         let facing = above_m / distance_m;
         let grazing = 1.0 - facing;
         let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing;
         let at_m = view.eye_m + from_eye_m;
         let footprint_m = distance_m / (view.focal_px.x * facing.sqrt());
-        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2)
-            + 0.3 * self.grain.at(at_m.x * 9.0, at_m.y * 9.0, footprint_m * 9.0);
-        let edge = 0.42 - 0.42 * light.puddles;
-        let puddle = smooth(edge, edge + 0.12, pool) * light.puddles.sqrt();
+        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2);
+        let edge = 0.45 - 0.35 * light.puddles;
+        let puddle = smooth(edge, edge + 0.25, pool) * light.puddles.sqrt();
         let film = 0.42 * light.wetness;
         let strength = fresnel * (film + (0.95 - film) * puddle);
-        if strength < 0.01 {
-            return;
+        if strength < 0.02 {
+            return None;
         }
         let rough = 1.0 - 0.85 * puddle;
-        let mirrored = if is_level {
-            self.march(row, column, nearness, above_m, rough, radiance)
-        } else {
-            None
-        };
-        let mirrored =
-            mirrored.unwrap_or_else(|| light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing)));
+        let mirrored = before.unwrap_or_else(|| {
+            let met = is_level.then(|| self.march(row, column, nearness, above_m, rough, radiance));
+            let sky = || light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing));
+            met.flatten().unwrap_or_else(sky)
+        });
         let left = fade(light.haze_per_m * distance_m);
         let share = strength * left;
         // Water that mirrors lets less light down to the ground.
         radiance[place] = radiance[place] * (1.0 - 0.6 * share) + mirrored * share;
+        Some(mirrored)
     }
 
     /// Follow the mirrored ray up its column to what stands in its way.
