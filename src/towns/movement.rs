@@ -16,6 +16,9 @@ pub struct Exit {
     pub lanes: usize,
 }
 
+/// Who keeps bending so far to the left goes round a roundabout, rad.
+const ROUND_RAD: f64 = 0.3;
+
 /// A way through a junction; lanes are counted from the left of the direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Movement {
@@ -56,6 +59,15 @@ pub fn movements(lanes: usize, exits: &[Exit]) -> Vec<Movement> {
         return found;
     };
     let (has_left, has_right) = (main > 0, main + 1 < exits.len());
+    // Out of a roundabout all lanes lead, as far as the exit has lanes, and the outer ones lead
+    // nowhere else: ways out and round do not cross.
+    let goes_round = exits[main].turn_rad > ROUND_RAD && !has_left && exits.len() == 2;
+    let leaving = if goes_round { exits[main + 1].lanes.min(lanes) } else { 0 };
+    if leaving > 1 {
+        add(main, 0..lanes + 1 - leaving, false);
+        add(main + 1, lanes - leaving..lanes, true);
+        return found;
+    }
     let spare = lanes.saturating_sub(exits[main].lanes);
     let straight = match (has_left, has_right) {
         (_, true) => 0..lanes - spare,

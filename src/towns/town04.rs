@@ -12,7 +12,7 @@ use crate::towns::{
 pub fn plan() -> Plan {
     let mut town = Plan::new("Town04");
     let [north_east, north_west, town_gate, south_west, south_east] =
-        town.roundabout("Knot", &WIDE_RING, [0.0, 0.0], 70.0, [40.0, 140.0, 180.0, 220.0, 320.0]);
+        town.roundabout("Knot", &WIDE_RING, [0.0, 0.0], 70.0, [40.0, 128.0, 180.0, 232.0, 320.0]);
 
     // Anticlockwise; the inner carriageway is driven against it.
     let [off_north, on_north] = [at(-735.0, 264.48), at(-425.0, 274.06)];

@@ -191,7 +191,8 @@ impl Expert {
             pair[1].in_junction && !pair[0].in_junction && !world.may_enter(pair[1].lane)
         };
         let line = waypoints.windows(2).find(closed)?;
-        let gap_m = line[1].at_m - front_m - LINE_M + self.config.follow.rest_gap_m;
+        let line_m = world.streets.lanes[line[0].lane].line_m.max(LINE_M);
+        let gap_m = line[1].at_m - front_m - line_m + self.config.follow.rest_gap_m;
         Some(Ahead::standing(gap_m))
     }
 

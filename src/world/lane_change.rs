@@ -68,13 +68,11 @@ pub fn better_lane(occupancy: &Occupancy, streets: &Streets, vehicle: &Vehicle) 
 
 /// Whether a vehicle is out of its lane before it reaches who is ahead there, if it changes now.
 fn comes_clear_of(vehicle: &Vehicle, width_m: f64, ahead: Ahead) -> bool {
-    /// It may speed up so much meanwhile, as a share of its speed.
+    /// It may speed up so much meanwhile, as a share of its speed; who stands will move off.
     const FASTER: f64 = 1.25;
-    let speed_mps = vehicle.speed_mps;
+    const MOVED_OFF_MPS: f64 = 1.0;
+    let speed_mps = vehicle.speed_mps.max(MOVED_OFF_MPS);
     let closing_mps = (FASTER * speed_mps - ahead.speed_mps).max(0.0);
-    if closing_mps == 0.0 {
-        return ahead.gap_m > 1.0;
-    }
     // Bodies in the middle of their lanes are clear of each other when one is half a lane aside
     // and half its own width.
     let aside_m = width_m / 2.0 + vehicle.half_m.y;

@@ -14,6 +14,7 @@ pub mod ego;
 pub mod car_following;
 pub mod kind;
 pub mod streets;
+pub mod stop_lines;
 pub mod paving;
 pub mod reservation;
 pub mod occupancy;

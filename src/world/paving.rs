@@ -10,7 +10,10 @@ use crate::{
         road_map::RoadMap,
     },
     towns::scenery::furniture::KERB_HEIGHT_M,
-    world::streets::{Course, Lane, Onward, STEP_M, Streets, Walk, WalkId},
+    world::{
+        stop_lines,
+        streets::{Course, Lane, Onward, STEP_M, Streets, Walk, WalkId},
+    },
 };
 
 /// What may be driven where the map sets no limit, m/s (50 km/h, and 20 in junctions).
@@ -50,7 +53,9 @@ pub fn pave(map: &RoadMap) -> Streets {
         lane.left = graph_lane.left.filter(|_| graph_lane.may_change_left);
         lane.right = graph_lane.right.filter(|_| graph_lane.may_change_right);
     }
-    Streets::new(lanes, walks(map))
+    let mut streets = Streets::new(lanes, walks(map));
+    stop_lines::set_back(&mut streets);
+    streets
 }
 
 fn lane(map: &RoadMap, id: usize) -> Lane {

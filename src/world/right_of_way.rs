@@ -32,6 +32,8 @@ pub struct Way {
     pub tail: Vec<LaneId>,
     /// From where on it asks, m before the junction.
     pub ask_m: f64,
+    /// Steps for which it has stood: who thinks of another way meanwhile keeps its turn.
+    pub stood: u64,
 }
 
 impl Way {
@@ -101,7 +103,7 @@ pub fn settle(
             reservations.ask(Claim {
                 actor: way.actor,
                 lanes,
-                since: step,
+                since: step.saturating_sub(way.stood),
                 is_taken: distance_m <= 0.0,
                 has_room: false,
                 is_wide: way.half_length_m > WIDE_M,
@@ -182,10 +184,15 @@ fn has_room(
     let ahead = occupancy.ahead(streets, beyond.iter().copied(), asker, HORIZON_M);
     // Who moves on will have made room.
     let has_now = |ahead: Ahead| ahead.gap_m + 3.0 * ahead.speed_mps > needed_m;
-    let queue = || beyond.iter().take_while(|lane| streets.lanes[**lane].junction.is_none());
-    let length_m: f64 = queue().map(|lane| streets.lanes[*lane].length_m()).sum();
-    let bodies = queue().flat_map(|lane| occupancy.on(*lane));
+    // Up to the next junction; a way that ends before it, as a route does, has no end of its own.
+    let Some(end) = beyond.iter().position(|lane| streets.lanes[*lane].junction.is_some()) else {
+        return ahead.is_none_or(has_now);
+    };
+    let queue = &beyond[..end];
+    let line_m = queue.last().map_or(0.0, |lane| streets.lanes[*lane].line_m);
+    let length_m: f64 = queue.iter().map(|lane| streets.lanes[*lane].length_m()).sum();
+    let bodies = queue.iter().flat_map(|lane| occupancy.on(*lane));
     let others = bodies.filter(|body| body.actor != way.actor);
     let taken_m: f64 = others.map(|body| 2.0 * body.half_length_m + REST_GAP_M).sum();
-    ahead.is_none_or(has_now) && length_m - taken_m > needed_m
+    ahead.is_none_or(has_now) && length_m - line_m - taken_m > needed_m
 }

@@ -35,6 +35,9 @@ pub struct Spot {
 /// Between two junctions the longest vehicle has so much room to stand in, or nobody stops, m.
 const WAITING_M: f64 = 15.0;
 
+/// Where vehicles stop before a junction if nothing keeps them further away, m from its edge.
+const LINE_M: f64 = 0.5;
+
 /// What differs in height by more than this is on another level: a bridge and what is below it, m.
 pub const LEVEL_M: f64 = 2.5;
 
@@ -111,6 +114,8 @@ pub struct Lane {
     pub width_m: f64,
     /// Up to here it is wide enough for a vehicle; its length, unless it narrows to nothing, m.
     pub usable_m: f64,
+    /// Vehicles stop so far before its end, where they have to wait there, m.
+    pub line_m: f64,
     /// From its start to where it ends for good, straight ahead, m; `None` where it leads on.
     pub dead_end_m: Option<f64>,
     pub limit_mps: f64,
@@ -131,6 +136,7 @@ impl Lane {
         Lane {
             name,
             usable_m: course.length_m(),
+            line_m: LINE_M,
             dead_end_m: None,
             course,
             width_m,

@@ -24,9 +24,6 @@ pub const EGO: ActorId = 0;
 /// Full braking, m/s2.
 const HARDEST_MPS2: f64 = 7.5;
 
-/// Where vehicles stop before a junction, m from its edge.
-const LINE_M: f64 = 0.5;
-
 /// How long drivers wait for room before they think of another way, s.
 const PATIENCE_S: f64 = 12.0;
 
@@ -183,6 +180,7 @@ impl Traffic {
             half_length_m: vehicle.half_m.x,
             speed_mps: vehicle.speed_mps,
             ask_m: ASK_M + vehicle.speed_mps.powi(2) / (2.0 * vehicle.model.comfort_mps2),
+            stood: (vehicle.standing_s / STEP_S).round() as u64,
         };
         let ego = ego.map(|ego| Way {
             actor: EGO,
@@ -192,6 +190,7 @@ impl Traffic {
             half_length_m: ego.half_length_m,
             speed_mps: ego.speed_mps,
             ask_m: ASK_M + ego.speed_mps.powi(2) / 4.0,
+            stood: 0,
         });
         self.vehicles.iter().map(way).chain(ego).collect()
     }
@@ -216,14 +215,15 @@ impl Traffic {
 
     /// The line before a junction that the vehicle may not enter yet.
     fn line_ahead(&self, streets: &Streets, vehicle: &Vehicle) -> Option<Ahead> {
-        let mut start_m = -vehicle.s_m;
+        let (mut start_m, mut line_m) = (-vehicle.s_m, 0.0);
         for (index, lane) in vehicle.way().enumerate() {
             let is_inside = streets.lanes[lane].junction.is_some();
             if index > 0 && is_inside && !self.reservations.may_enter(vehicle.id, lane) {
-                let gap_m = start_m - vehicle.half_m.x - LINE_M + vehicle.model.idm().rest_gap_m;
+                let gap_m = start_m - vehicle.half_m.x - line_m + vehicle.model.idm().rest_gap_m;
                 return Some(Ahead::standing(gap_m));
             }
             start_m += streets.lanes[lane].length_m();
+            line_m = streets.lanes[lane].line_m;
             if start_m > HORIZON_M {
                 break;
             }
