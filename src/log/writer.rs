@@ -17,7 +17,7 @@ use mcap::{
 };
 
 use crate::{
-    atomic::unfinished_name,
+    atomic::{sync_folder, unfinished_name},
     error::{Error, Result},
     log::encode::{Endian, Message},
 };
@@ -145,9 +145,12 @@ impl LogWriter {
     pub fn finish(mut self) -> Result<()> {
         self.mcap.finish().map_err(|e| mcap_error(&self.temporary, e))?;
         refuse_existing(&self.path)?;
+        // What has its name must be whole even after a loss of power.
+        let sync = File::open(&self.temporary).and_then(|file| file.sync_all());
+        sync.map_err(Error::io("flush", &self.temporary))?;
         fs::rename(&self.temporary, &self.path).map_err(Error::io("rename", &self.temporary))?;
         self.finished = true;
-        Ok(())
+        self.path.parent().map_or(Ok(()), sync_folder)
     }
 
     fn add_topic(&mut self, topic: &str, message: &dyn Message) -> Result<Topic> {

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
+    footprint::Footprint,
     frame::Command,
     policy::Action,
     sensors::{
@@ -95,35 +96,26 @@ pub fn way_ahead(route: &Route, at_m: f64) -> Vec<Pose> {
 
 /// Boxes of all that moves near the car: vehicles, then people.
 pub fn objects(snapshot: &Snapshot) -> Vec<Object> {
-    let vehicles = snapshot.vehicles.iter().map(|vehicle| {
-        let kind = ObjectKind::Vehicle(vehicle.kind);
-        (
-            vehicle.id,
-            kind,
-            vehicle.footprint,
-            vehicle.ground_m,
-            vehicle.height_m,
-            vehicle.velocity_mps,
-        )
+    let vehicles = snapshot.vehicles.iter().map(|vehicle| Object {
+        id: vehicle.id,
+        kind: ObjectKind::Vehicle(vehicle.kind),
+        pose: middle(&vehicle.footprint, vehicle.ground_m, vehicle.height_m),
+        size_m: (2.0 * vehicle.footprint.half_m).extend(vehicle.height_m),
+        velocity_mps: vehicle.velocity_mps,
     });
-    let walkers = snapshot.walkers.iter().map(|walker| {
-        let (kind, height_m) = (ObjectKind::Walker(walker.kind), walker.kind.height_m());
-        (walker.id, kind, walker.footprint, walker.ground_m, height_m, walker.velocity_mps)
+    let walkers = snapshot.walkers.iter().map(|walker| Object {
+        id: walker.id,
+        kind: ObjectKind::Walker(walker.kind),
+        pose: middle(&walker.footprint, walker.ground_m, walker.kind.height_m()),
+        size_m: (2.0 * walker.footprint.half_m).extend(walker.kind.height_m()),
+        velocity_mps: walker.velocity_mps,
     });
     let ego_m = snapshot.ego.position_m;
-    let near = vehicles
-        .chain(walkers)
-        .filter(|(_, _, footprint, ..)| footprint.centre_m.distance(ego_m) < NEAR_M);
-    let object = |(id, kind, footprint, ground_m, height_m, velocity_mps)| {
-        let footprint: crate::footprint::Footprint = footprint;
-        let middle_m = footprint.centre_m.extend(ground_m + height_m / 2.0);
-        Object {
-            id,
-            kind,
-            pose: Pose::new(middle_m, footprint.forward),
-            size_m: (2.0 * footprint.half_m).extend(height_m),
-            velocity_mps,
-        }
-    };
-    near.map(object).collect()
+    let is_near = |object: &Object| object.pose.position_m.truncate().distance(ego_m) < NEAR_M;
+    vehicles.chain(walkers).filter(is_near).collect()
+}
+
+/// The middle of a box that stands on the ground.
+fn middle(footprint: &Footprint, ground_m: f64, height_m: f64) -> Pose {
+    Pose::new(footprint.centre_m.extend(ground_m + height_m / 2.0), footprint.forward)
 }

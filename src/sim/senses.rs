@@ -29,7 +29,7 @@ use crate::{
 /// Quality of pictures, as CARLA's bridge stores them.
 const JPEG_QUALITY: u8 = 90;
 
-/// Sensors that remember.
+/// The sensors of a drive, with what they remember.
 pub struct Senses<'t> {
     rig: &'t Rig,
     stage: &'t Stage,

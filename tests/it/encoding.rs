@@ -418,27 +418,25 @@ fn our_own_protobuf_types_are_what_their_descriptors_say() {
         speed_limit_mps: 13.5,
         command: "left".into(),
     };
-    let messages: [(&dyn Message, &[(&str, &str)]); 3] = [
-        (&control, &[("steer", "-0.5"), ("throttle", "0.25"), ("brake", "0.75")]),
-        (
-            &imu,
-            &[
-                ("orientation.w", "0.4"),
-                ("angular_velocity.y", "2.5"),
-                ("linear_acceleration.z", "6.5"),
-            ],
-        ),
-        (
-            &situation,
-            &[("in_junction", "true"), ("speed_limit_mps", "13.5"), ("command", "\"left\"")],
-        ),
-    ];
-    for (message, fields) in messages {
+    let check = |message: &dyn Message, fields: &[(&str, &str)]| {
         let read = reflected(message);
         let head = [("timestamp.seconds", "1700000000"), ("timestamp.nanos", "250000001")];
         for (path, wanted) in head.iter().chain(fields) {
             assert_eq!(field(&read, path), *wanted, "{} {path}", message.schema());
         }
         assert_eq!(read.unknown_fields().count(), 0, "{}", message.schema());
-    }
+    };
+    check(&control, &[("steer", "-0.5"), ("throttle", "0.25"), ("brake", "0.75")]);
+    check(
+        &imu,
+        &[
+            ("orientation.w", "0.4"),
+            ("angular_velocity.y", "2.5"),
+            ("linear_acceleration.z", "6.5"),
+        ],
+    );
+    check(
+        &situation,
+        &[("in_junction", "true"), ("speed_limit_mps", "13.5"), ("command", "\"left\"")],
+    );
 }
