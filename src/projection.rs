@@ -1,5 +1,7 @@
 //! Points onto the picture: the camera model that ingest and the simulator share.
 
+use glam::DVec3;
+
 use crate::error::{Error, Result};
 
 /// Nearest depth that is projected, metres: closer returns hit the ego vehicle or the lens.
@@ -161,4 +163,42 @@ fn brown(x: f64, y: f64, r2: f64, radial: f64, p1: f64, p2: f64) -> [f64; 2] {
         x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
         y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
     ]
+}
+
+/// The nearest return of each pixel: of a lidar's, a radar's, in a log or simulated.
+pub struct Nearest<'c, T> {
+    camera: &'c Camera,
+    /// For each pixel one more than the index of its return; 0 where there is none.
+    by_pixel: Vec<u32>,
+    /// Squared distance, and what the return says.
+    returns: Vec<(f64, T)>,
+}
+
+impl<'c, T: Copy> Nearest<'c, T> {
+    pub fn new(camera: &'c Camera) -> Self {
+        let by_pixel = vec![0; camera.width * camera.height];
+        Nearest { camera, by_pixel, returns: Vec::new() }
+    }
+
+    /// A return at a point of the optical frame; NaNs fall off the picture. Of two equally near
+    /// returns the first stays.
+    pub fn add(&mut self, point_m: DVec3, says: T) {
+        let Some(pixel) = self.camera.pixel(point_m.to_array()) else { return };
+        let here = (point_m.length_squared(), says);
+        let slot = &mut self.by_pixel[pixel as usize];
+        match slot.checked_sub(1) {
+            None => {
+                self.returns.push(here);
+                *slot = self.returns.len() as u32;
+            }
+            Some(at) if here.0 < self.returns[at as usize].0 => self.returns[at as usize] = here,
+            Some(_) => {}
+        }
+    }
+
+    /// Ascending by pixel.
+    pub fn finish(self) -> impl Iterator<Item = (u32, T)> {
+        let occupied = (0..).zip(self.by_pixel).filter(|(_, slot)| *slot > 0);
+        occupied.map(move |(pixel, slot)| (pixel, self.returns[slot as usize - 1].1))
+    }
 }

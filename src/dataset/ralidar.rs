@@ -13,7 +13,7 @@ use crate::{
         signals::{Kind, Pose},
         value::Struct,
     },
-    projection::Camera,
+    projection::{Camera, Nearest},
 };
 
 /// Lidar returns of a cloud on the picture.
@@ -85,42 +85,4 @@ pub fn radar_pixels(
     // An empty scan is one of a radar with speeds: nothing says that it has none.
     let speed_mps = (has_speeds || pixel.is_empty()).then_some(speed);
     Ok(RadarPixels { pixel, speed_mps })
-}
-
-/// The nearest return of each pixel.
-struct Nearest<'c, T> {
-    camera: &'c Camera,
-    /// For each pixel one more than the index of its return; 0 where there is none.
-    by_pixel: Vec<u32>,
-    /// Squared distance, and what the return says.
-    returns: Vec<(f64, T)>,
-}
-
-impl<'c, T: Copy> Nearest<'c, T> {
-    fn new(camera: &'c Camera) -> Self {
-        let by_pixel = vec![0; camera.width * camera.height];
-        Nearest { camera, by_pixel, returns: Vec::new() }
-    }
-
-    /// A return at a point of the optical frame; NaNs fall off the picture. Of two equally near
-    /// returns the first stays.
-    fn add(&mut self, point_m: DVec3, says: T) {
-        let Some(pixel) = self.camera.pixel(point_m.to_array()) else { return };
-        let here = (point_m.length_squared(), says);
-        let slot = &mut self.by_pixel[pixel as usize];
-        match slot.checked_sub(1) {
-            None => {
-                self.returns.push(here);
-                *slot = self.returns.len() as u32;
-            }
-            Some(at) if here.0 < self.returns[at as usize].0 => self.returns[at as usize] = here,
-            Some(_) => {}
-        }
-    }
-
-    /// Ascending by pixel.
-    fn finish(self) -> impl Iterator<Item = (u32, T)> {
-        let occupied = (0..).zip(self.by_pixel).filter(|(_, slot)| *slot > 0);
-        occupied.map(move |(pixel, slot)| (pixel, self.returns[slot as usize - 1].1))
-    }
 }

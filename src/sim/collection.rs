@@ -102,7 +102,7 @@ impl Collection {
         tell(Progress::ToDo(reckoned * missing.len() as u64));
         let stages = Stages::new(self.maps.as_deref(), &self.plan.towns);
         let shapes = Shapes::new();
-        missing.into_par_iter().with_max_len(1).try_for_each(|episode| {
+        missing.into_par_iter().with_max_len(1).try_for_each(|episode| -> Result<()> {
             let driven = std::cell::Cell::new(0);
             let on_second = || {
                 driven.set(driven.get() + 1);

@@ -24,3 +24,4 @@ pub mod ros2_messages;
 pub mod record;
 pub mod collection;
 pub mod sheet;
+pub mod senses_sheet;

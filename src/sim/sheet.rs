@@ -28,7 +28,7 @@ const WATCHED_S: f64 = 60.0;
 const BETWEEN_STEPS: u64 = 50;
 
 /// Pixels of a picture that become one, along each side.
-const SHRUNK: usize = 2;
+pub const SHRUNK: usize = 2;
 
 /// Brightness is told apart in steps of this.
 const LEVELS: u8 = 5;
@@ -44,12 +44,12 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    fn blank(width: usize, height: usize) -> Sheet {
+    pub fn blank(width: usize, height: usize) -> Sheet {
         Sheet { width, height, rgb: vec![255; 3 * width * height] }
     }
 
-    /// Put a picture of a size at a place, shrunk.
-    fn put(&mut self, picture: &[u8], width: usize, at: [usize; 2]) {
+    /// Put a picture of a width at a place (column, row), shrunk.
+    pub fn put(&mut self, picture: &[u8], width: usize, at: [usize; 2]) {
         let rows = picture.len() / (3 * width) / SHRUNK;
         for row in 0..rows {
             for column in 0..width / SHRUNK {
@@ -106,7 +106,7 @@ pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
 }
 
 /// The moment of a drive with most people and vehicles close ahead.
-fn busiest(mut drive: Drive) -> Snapshot {
+pub fn busiest(mut drive: Drive) -> Snapshot {
     let mut best = (0.0, drive.world.snapshot());
     while drive.world.time_s() < WATCHED_S && !drive.is_over() {
         drive.step();

@@ -60,6 +60,7 @@ mod scenery;
 mod scene;
 mod flow;
 mod recording;
+mod one_pixel;
 mod replay;
 mod ranging;
 mod camera;

@@ -71,7 +71,7 @@ pub(crate) fn known() -> &'static [Known] {
 }
 
 /// The frames of the shared log.
-fn ingested() -> &'static [Frame] {
+pub(crate) fn ingested() -> &'static [Frame] {
     static FRAMES: OnceLock<Vec<Frame>> = OnceLock::new();
     FRAMES.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
@@ -82,7 +82,7 @@ fn ingested() -> &'static [Frame] {
     })
 }
 
-fn step_of(stamp_ns: i64) -> usize {
+pub(crate) fn step_of(stamp_ns: i64) -> usize {
     let since_ns = stamp_ns - shared().episode.start_ns();
     assert_eq!(since_ns % STEP_NS, 0, "stamps are those of steps");
     (since_ns / STEP_NS) as usize

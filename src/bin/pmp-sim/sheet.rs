@@ -7,19 +7,28 @@ use pmp::{
     atomic,
     cli::Outcome,
     error::{Error, Result},
-    sim::sheet::{self, Sheet as Pictures},
+    sim::{
+        senses_sheet,
+        sheet::{self, Sheet as Pictures},
+    },
     world::town::Town,
 };
 
 /// Draw what the camera sees: one moment under 16 skies, and four levels of traffic
 ///
 /// Rows: daytime, sunset, night, dark; columns: clear, drizzle, rainy, storm. The last row has a
-/// clear day with empty, little, regular and dense traffic.
+/// clear day with empty, little, regular and dense traffic. With --senses, one moment by all sensors:
+/// camera with the boxes of others, and in a storm in the dark; lidar by height, on that day and in
+/// that storm; lidar by distance; radar by speed (blue comes nearer, red goes away).
 #[derive(Args)]
 pub(crate) struct Sheet {
     /// Picture to write, PNG. Replaces what is there
     #[arg(long, value_name = "FILE.png")]
     out: PathBuf,
+
+    /// One moment by all sensors, in place of many skies
+    #[arg(long)]
+    senses: bool,
 
     /// Town to drive in
     #[arg(long, value_name = "T", default_value = "Town03")]
@@ -31,9 +40,10 @@ pub(crate) struct Sheet {
 }
 
 pub(crate) fn run(args: &Sheet) -> Result<Outcome> {
-    let Sheet { out, town, seed } = args;
+    let Sheet { out, senses, town, seed } = args;
     let town = Town::choose(None, std::slice::from_ref(town))?.remove(0);
-    let Pictures { width, height, rgb } = sheet::draw(&town, *seed)?;
+    let Pictures { width, height, rgb } =
+        if *senses { senses_sheet::draw(town, *seed)? } else { sheet::draw(&town, *seed)? };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);

@@ -159,4 +159,10 @@ impl Camera {
         self.sensor.develop(&light, &self.radiance, &mut shot, view.width, &mut self.picture);
         &self.picture
     }
+
+    /// Depth of what each pixel of the last picture shows, m, row by row: along the optical axis, as the
+    /// z of the camera's frame; infinite where there is sky.
+    pub fn depths_m(&self) -> impl Iterator<Item = f32> {
+        self.visibility.nearness.iter().map(|nearness| 1.0 / nearness)
+    }
 }
