@@ -12,4 +12,4 @@ for town in Town03 Town07; do
     "$sim" map "$maps/$town.xodr" --picture "docs/$town.png" --scenery 0
 done
 "$sim" sheet --town Town03 --seed 2 --out docs/weather.png
-"$sim" sheet --senses --town Town03 --seed 2 --out docs/senses.png
+"$sim" sheet --senses --town Town05 --seed 4 --out docs/senses.png
