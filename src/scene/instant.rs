@@ -76,7 +76,7 @@ impl Instant {
     /// The bodies of a snapshot.
     pub fn of(snapshot: &Snapshot, shapes: &Shapes) -> Instant {
         let vehicles = snapshot.vehicles.iter().map(|state| vehicle(state, shapes));
-        let walkers = snapshot.walkers.iter().map(|state| walker(state, snapshot.time_s, shapes));
+        let walkers = snapshot.walkers.iter().map(|state| walker(state, shapes));
         Instant { time_s: snapshot.time_s, bodies: vehicles.chain(walkers).collect() }
     }
 }
@@ -93,11 +93,10 @@ fn vehicle(state: &VehicleState, shapes: &Shapes) -> Body {
     }
 }
 
-fn walker(state: &WalkerState, time_s: f64, shapes: &Shapes) -> Body {
-    let speed_mps = state.velocity_mps.length();
+fn walker(state: &WalkerState, shapes: &Shapes) -> Body {
     Body {
         actor: state.id,
-        mesh: shapes.walker(state.kind, state.id, speed_mps, time_s),
+        mesh: shapes.walker(state),
         world_from_body: place(&state.footprint, state.ground_m, DVec3::ONE),
         colour: one_of(&JACKETS, state.colour),
         velocity_mps: state.velocity_mps.extend(0.0),

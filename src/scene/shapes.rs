@@ -15,6 +15,7 @@ use crate::{
         ego::SEDAN,
         kind::{VEHICLES, VehicleKind, VehicleModel, WalkerKind},
         reservation::ActorId,
+        snapshot::WalkerState,
     },
 };
 
@@ -101,25 +102,26 @@ impl Shapes {
         models[mixed(id) % models.len()].clone()
     }
 
-    /// The mesh of somebody on foot who has a speed at a time: the legs move with the way that is
-    /// gone, and stand still with the body.
-    pub fn walker(&self, kind: WalkerKind, id: ActorId, speed_mps: f64, time_s: f64) -> Arc<Mesh> {
-        let looks = match kind {
+    /// The mesh of somebody on foot: the legs move with the way that is gone, swing as far as the speed
+    /// makes them, and stand still with the body.
+    pub fn walker(&self, state: &WalkerState) -> Arc<Mesh> {
+        let looks = match state.kind {
             WalkerKind::Adult => &self.adults,
             WalkerKind::Child => &self.children,
         };
-        let walking = &looks[mixed(id) % looks.len()];
+        let walking = &looks[mixed(state.id) % looks.len()];
+        let speed_mps = state.velocity_mps.length();
         if speed_mps < STANDING_MPS {
             return walking.standing.clone();
         }
         // Short legs swing as far at a lower speed.
         let stature = walking.height_m / WalkerKind::Adult.height_m();
-        let alike_mps = speed_mps / stature.sqrt();
-        let gait = nearest_gait(alike_mps);
-        let stride_m = f64::from(stride_m(alike_mps as f32, walking.height_m as f32));
-        let share = (speed_mps * time_s / stride_m + f64::from(id) * 0.618).rem_euclid(1.0);
-        let cycle = &walking.cycles[gait];
-        cycle[(share * POSES as f64) as usize % POSES].clone()
+        let alike = |mps: f64| mps / stature.sqrt();
+        // Steps of one length at all times: legs do not jump when somebody slows down.
+        let stride_m = stride_m(alike(state.pace_mps) as f32, walking.height_m as f32);
+        let strides = state.walked_m / f64::from(stride_m) + f64::from(state.id) * 0.618;
+        let cycle = &walking.cycles[nearest_gait(alike(speed_mps))];
+        cycle[(strides.rem_euclid(1.0) * POSES as f64) as usize % POSES].clone()
     }
 
     /// The ego vehicle, for pictures from outside.

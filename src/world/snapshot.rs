@@ -66,6 +66,10 @@ pub struct WalkerState {
     /// Of the ground below.
     pub ground_m: f64,
     pub velocity_mps: DVec2,
+    /// What this one walks or runs with nobody in the way, m/s.
+    pub pace_mps: f64,
+    /// Way that was gone so far, m.
+    pub walked_m: f64,
     /// Stepped out without looking.
     pub is_jaywalking: bool,
     /// On a street, or on the way across.
@@ -82,6 +86,8 @@ pub fn walker_states(walkers: &Walkers) -> Vec<WalkerState> {
         footprint: walker.footprint(),
         ground_m: walker.ground_m(),
         velocity_mps: walker.velocity_mps,
+        pace_mps: walker.pace_mps,
+        walked_m: walker.walked_m,
         is_jaywalking: walker.is_jaywalking,
         is_crossing: walker.is_crossing(),
         colour: walker.colour,
@@ -130,6 +136,7 @@ impl Snapshot {
             walkers: walkers
                 .map(|(a, b)| WalkerState {
                     footprint: a.footprint.towards(&b.footprint, share),
+                    walked_m: a.walked_m + (b.walked_m - a.walked_m) * share,
                     ..*b
                 })
                 .collect(),

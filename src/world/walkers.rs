@@ -51,6 +51,8 @@ pub struct Walker {
     /// Height of the side-walk that is walked on, m.
     kerb_m: f64,
     pub velocity_mps: DVec2,
+    /// Way that was gone so far, m.
+    pub walked_m: f64,
     /// Unit vector that the body faces.
     pub facing: DVec2,
     /// Crossed without looking the last time.
@@ -141,6 +143,7 @@ impl Walkers {
     pub fn step(&mut self, streets: &Streets, vehicles: &[Seen]) {
         for walker in &mut self.walkers {
             walker.step(streets, vehicles, &mut self.crossings);
+            walker.walked_m += walker.velocity_mps.length() * STEP_S;
         }
     }
 
@@ -172,6 +175,7 @@ impl Walker {
             height_m: 0.0,
             kerb_m: 0.0,
             velocity_mps: DVec2::ZERO,
+            walked_m: 0.0,
             facing: DVec2::X,
             is_jaywalking: false,
             activity: Activity::Walking,

@@ -15,6 +15,8 @@ use pmp::{
     world::kind::WalkerKind,
 };
 
+use crate::scene::somebody;
+
 const WIDTH: usize = 600;
 const DAY: Sky = Sky { illumination: Illumination::Daytime, weather: Weather::Clear };
 const DARK: Sky = Sky { illumination: Illumination::Dark, weather: Weather::Clear };
@@ -262,7 +264,7 @@ fn walker(id: u32, ahead_m: f32, aside_m: f32) -> Body {
     let jackets = [[178, 44, 40], [52, 84, 138], [198, 190, 170], [54, 58, 62]];
     Body {
         actor: id,
-        mesh: Shapes::new().walker(WalkerKind::Adult, id, 1.2, 0.3),
+        mesh: Shapes::new().walker(&somebody(WalkerKind::Adult, id, 1.2, 0.36)),
         world_from_body: Affine3A::from_rotation_translation(
             Quat::from_rotation_z(1.2),
             Vec3::new(2.0 + ahead_m, aside_m, 0.0),

@@ -6,6 +6,8 @@ use std::{
     sync::{Arc, LazyLock},
 };
 
+use crate::scene::somebody;
+
 use glam::{Affine3A, DAffine3, DVec2, DVec3, Vec2, Vec3};
 use parry3d::{
     math::Vector,
@@ -392,7 +394,7 @@ fn the_same_seed_gives_the_same_returns() {
 #[test]
 fn a_storm_in_the_dark_hides_nobody_from_lidar_and_radar() {
     let plain = plain();
-    let mesh = SHAPES.walker(WalkerKind::Adult, 9, 0.0, 0.0);
+    let mesh = SHAPES.walker(&somebody(WalkerKind::Adult, 9, 0.0, 0.0));
     let instant = instant(vec![body(mesh, 9, Vec3::X * 15.0, 1.6, DVec3::ZERO)]);
     let reach = Reach::new(&plain, &instant, Vec3::ZERO, 100.0);
     let at = DAffine3::IDENTITY;

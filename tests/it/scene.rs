@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, Vec3};
 use pmp::{
+    footprint::Footprint,
     map::{opendrive::LaneKind, road_map::RoadMap},
     noise::{Noise, Purpose},
     scene::{
@@ -17,7 +18,7 @@ use pmp::{
     world::{
         kind::{VEHICLES, VehicleKind, WalkerKind},
         paving::pave,
-        snapshot::walker_states,
+        snapshot::{WalkerState, walker_states},
         walkers::Walkers,
     },
 };
@@ -304,11 +305,29 @@ fn feet_stay_on_the_ground_and_swing_further_the_faster_one_is() {
     }
 }
 
+/// Somebody at the origin who goes east.
+pub(crate) fn somebody(kind: WalkerKind, id: u32, speed_mps: f64, walked_m: f64) -> WalkerState {
+    WalkerState {
+        id,
+        kind,
+        footprint: Footprint::new(DVec2::ZERO, 0.0, kind.half_m()),
+        ground_m: 0.0,
+        velocity_mps: DVec2::X * speed_mps,
+        pace_mps: 1.4,
+        walked_m,
+        is_jaywalking: false,
+        is_crossing: false,
+        colour: 0.0,
+    }
+}
+
 #[test]
 fn legs_move_with_the_way_that_is_gone() {
     let shapes = Shapes::new();
     for kind in [WalkerKind::Adult, WalkerKind::Child] {
-        let at = |speed_mps: f64, time_s: f64| shapes.walker(kind, 10_003, speed_mps, time_s);
+        let at = |speed_mps: f64, time_s: f64| {
+            shapes.walker(&somebody(kind, 10_003, speed_mps, speed_mps * time_s))
+        };
         assert_eq!(at(0.0, 1.0), at(0.0, 7.3), "who stands does not move");
         let (low, high) = at(0.0, 0.0).bounds_m().unwrap();
         assert!(low.z.abs() < 1e-3 && (high.z - kind.height_m() as f32).abs() < 1e-3);
