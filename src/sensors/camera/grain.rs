@@ -9,7 +9,7 @@ use crate::{
 const SIDE: usize = 128;
 const LEVELS: usize = 7;
 
-/// Values in [-1, 1] that repeat every [`SIDE`] texels, each level half as fine as the one before.
+/// Values in [-1, 1] that repeat every `SIDE` texels, each level half as fine as the one before.
 #[derive(Clone, Debug)]
 pub struct Grain {
     levels: Vec<Vec<f32>>,
