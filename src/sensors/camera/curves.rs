@@ -26,6 +26,17 @@ pub fn floor(value: f32) -> i32 {
     towards_zero - i32::from((towards_zero as f32) > value)
 }
 
+/// Floats of this size are whole: to add it rounds, quicker than any conversion.
+const WHOLE: f32 = (3 << 22) as f32;
+
+/// The whole number below, and what is left, in [0, 1]; for numbers within 4 million. A whole number
+/// itself may be seen as the end of the step before.
+#[inline]
+pub fn split(value: f32) -> (i32, f32) {
+    let rounded = (value - 0.5) + WHOLE;
+    (rounded.to_bits().wrapping_sub(WHOLE.to_bits()) as i32, value - (rounded - WHOLE))
+}
+
 /// Bars of one width, one at the start of each period.
 #[derive(Clone, Copy, Debug)]
 pub struct Bars {
@@ -34,20 +45,62 @@ pub struct Bars {
     per_period: f32,
 }
 
+/// A stretch of some width, at least a millimetre.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch {
+    width: f32,
+    per_width: f32,
+}
+
+impl Stretch {
+    #[inline]
+    pub fn new(width: f32) -> Stretch {
+        let width = width.max(1e-3);
+        Stretch { width, per_width: 1.0 / width }
+    }
+}
+
 impl Bars {
     pub const fn new(width: f32, period: f32) -> Bars {
         Bars { width, period, per_period: 1.0 / period }
     }
 
-    /// Share of a stretch `footprint` wide around `place` that bars cover.
+    /// Share of a stretch around `place` that bars cover.
     #[inline]
-    pub fn share(&self, place: f32, footprint: f32) -> f32 {
-        let covered = |to: f32| {
+    pub fn share(&self, place: f32, stretch: Stretch) -> f32 {
+        self.shares(place, [0.0], stretch)[0]
+    }
+
+    /// The same for bars that are wider by so much on each side.
+    #[inline]
+    pub fn shares<const N: usize>(
+        &self,
+        place: f32,
+        wider: [f32; N],
+        stretch: Stretch,
+    ) -> [f32; N] {
+        let from_middle = place - 0.5 * self.width;
+        let (_, into) = split(from_middle * self.per_period + 0.5);
+        let off = (into - 0.5).abs() * self.period;
+        wider.map(|wider| {
+            let width = self.width + 2.0 * wider;
+            let covered = if stretch.width < self.period - width {
+                // It meets one bar at most.
+                (0.5 * (width + stretch.width) - off).min(width).min(stretch.width)
+            } else {
+                self.covered(from_middle + 0.5 * width, width, stretch)
+            };
+            (covered * stretch.per_width).clamp(0.0, 1.0)
+        })
+    }
+
+    /// How much of a stretch bars of another width cover, around a place counted from their start.
+    fn covered(&self, place: f32, width: f32, stretch: Stretch) -> f32 {
+        let before = |to: f32| {
             let whole = floor(to * self.per_period) as f32;
-            whole * self.width + (to - whole * self.period).min(self.width)
+            whole * width + (to - whole * self.period).min(width)
         };
-        let half = 0.5 * footprint.max(1e-3);
-        ((covered(place + half) - covered(place - half)) / (2.0 * half)).clamp(0.0, 1.0)
+        before(place + 0.5 * stretch.width) - before(place - 0.5 * stretch.width)
     }
 }
 
@@ -84,9 +137,9 @@ mod tests {
     #[test]
     fn wide_footprints_see_the_mean_of_bars() {
         let bars = Bars::new(0.5, 2.0);
-        assert!((bars.share(7.3, 400.0) - 0.25).abs() < 2e-3);
-        assert_eq!(bars.share(0.25, 0.01), 1.0);
-        assert_eq!(bars.share(-0.25, 0.01), 0.0);
+        assert!((bars.share(7.3, Stretch::new(400.0)) - 0.25).abs() < 2e-3);
+        assert_eq!(bars.share(0.25, Stretch::new(0.01)), 1.0);
+        assert_eq!(bars.share(-0.25, Stretch::new(0.01)), 0.0);
     }
 
     #[test]
