@@ -1,10 +1,12 @@
 //! Light on what each pixel shows, once per pixel.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3, Vec3A};
 
 use crate::sensors::camera::{
     curves::{fade, smooth},
-    facets::Facet,
+    facets::{Facet, Texture},
     grain::Grain,
     lamps::{Beam, LightMap, glow},
     light::Light,
@@ -17,6 +19,10 @@ use crate::sensors::camera::{
 
 /// Share of the light of the own lamps that drops throw back into the camera.
 const VEIL: f32 = 0.009;
+
+/// Light is worked out once for so many pixels of a row of a facet, or of the sky.
+const KNOTS_PX: usize = 8;
+const SKY_KNOTS_PX: usize = 4;
 
 /// Everything that lights a picture.
 pub struct Lighting<'a> {
@@ -33,15 +39,66 @@ pub struct Lighting<'a> {
     pub ground_m: f32,
 }
 
-/// A facet, lit.
+/// A facet, prepared.
 struct Lit {
     surface: Surface,
+    texture: Texture,
     normal: Vec3A,
     /// Light from sky and ground, and from the sun where nothing stands before it.
     ambient: Vec3A,
     sun: Vec3A,
     emission: Vec3A,
     faces_up: bool,
+    is_shiny: bool,
+}
+
+/// What changes so slowly along a row of a facet that it is worked out at some pixels alone.
+#[derive(Clone, Copy)]
+struct Knot {
+    /// Share of the light that is left by the way through the air; breadth of the pixel on the
+    /// surface, m; how strongly a window mirrors at this angle beyond what it does facing it.
+    air: Vec3A,
+    /// What lamps throw, as it arrives.
+    lamps: Vec3A,
+    /// The sky that is mirrored.
+    mirrored: Vec3A,
+    /// What shines by itself, and what the air adds.
+    added: Vec3A,
+}
+
+impl Knot {
+    fn plus(&self, step: &Knot, steps: f32) -> Knot {
+        Knot {
+            air: self.air + step.air * steps,
+            lamps: self.lamps + step.lamps * steps,
+            mirrored: self.mirrored + step.mirrored * steps,
+            added: self.added + step.added * steps,
+        }
+    }
+
+    /// The step from this one to another that is so many steps away.
+    fn step_to(&self, other: &Knot, steps: f32) -> Knot {
+        let share = 1.0 / steps;
+        Knot {
+            air: (other.air - self.air) * share,
+            lamps: (other.lamps - self.lamps) * share,
+            mirrored: (other.mirrored - self.mirrored) * share,
+            added: (other.added - self.added) * share,
+        }
+    }
+}
+
+/// Where rays of a row go; 1 m ahead of the eye, world frame.
+struct Row {
+    first: Vec3A,
+    across: Vec3A,
+}
+
+impl Row {
+    #[inline]
+    fn ray(&self, column: usize) -> Vec3A {
+        self.first + self.across * column as i32 as f32
+    }
 }
 
 impl Lighting<'_> {
@@ -56,33 +113,80 @@ impl Lighting<'_> {
         radiance: &mut [Vec3A],
     ) {
         let across = Vec3A::from(view.world_from_camera.x_axis / view.focal_px.x);
-        for row in 0..view.height {
-            let start = row * view.width;
-            let first = Vec3A::from(view.ray(Vec2::new(0.5, row as f32 + 0.5)));
-            let mut column = 0;
-            while column < view.width {
-                let facet = visibility.facet[start + column];
-                let run = visibility.facet[start + column..start + view.width].iter();
-                let end = column + run.take_while(|other| **other == facet).count();
-                let rays = (column..end).map(|column| first + across * column as f32);
-                let pixels = radiance[start + column..start + end].iter_mut();
-                if facet == NOTHING {
-                    for (pixel, ray) in pixels.zip(rays) {
-                        *pixel = self.sky(ray.normalize());
-                    }
+        for number in 0..view.height {
+            let pixels = number * view.width..(number + 1) * view.width;
+            let first = Vec3A::from(view.ray(Vec2::new(0.5, number as f32 + 0.5)));
+            let row = Row { first, across };
+            let facet = &visibility.facet[pixels.clone()];
+            let nearness = &visibility.nearness[pixels.clone()];
+            let openness = &openness[pixels.clone()];
+            let radiance = &mut radiance[pixels];
+            let mut from = 0;
+            while from < view.width {
+                let this = facet[from];
+                let end = from + facet[from..].iter().take_while(|other| **other == this).count();
+                let run = from..end;
+                if this == NOTHING {
+                    self.shade_sky(&row, run, radiance);
                 } else {
-                    let facet = &facets[facet as usize];
-                    let lit = self.prepare(facet);
-                    let nearness = visibility.nearness[start + column..start + end].iter();
-                    let openness = openness[start + column..start + end].iter();
-                    for (((pixel, ray), nearness), openness) in
-                        pixels.zip(rays).zip(nearness).zip(openness)
-                    {
-                        *pixel = self.pixel(view, facet, &lit, ray, 1.0 / nearness, *openness);
-                    }
+                    let lit = self.prepare(&facets[this as usize]);
+                    self.shade_facet(view, &lit, &row, run, nearness, openness, radiance);
                 }
-                column = end;
+                from = end;
             }
+        }
+    }
+
+    fn shade_sky(&self, row: &Row, run: Range<usize>, radiance: &mut [Vec3A]) {
+        let last = run.end - 1;
+        let mut from = run.start;
+        let mut here = self.sky(row.ray(from).normalize());
+        while from < last {
+            let to = (from + SKY_KNOTS_PX).min(last);
+            let there = self.sky(row.ray(to).normalize());
+            let step = (there - here) / (to - from) as f32;
+            for (i, pixel) in radiance[from..to].iter_mut().enumerate() {
+                *pixel = here + step * i as i32 as f32;
+            }
+            (from, here) = (to, there);
+        }
+        radiance[last] = here;
+    }
+
+    #[expect(clippy::too_many_arguments)]
+    fn shade_facet(
+        &self,
+        view: &View,
+        lit: &Lit,
+        row: &Row,
+        run: Range<usize>,
+        nearness: &[f32],
+        openness: &[f32],
+        radiance: &mut [Vec3A],
+    ) {
+        let last = run.end - 1;
+        let mut from = run.start;
+        let knot = |column: usize| self.knot(view, lit, row.ray(column), nearness[column]);
+        let eye_m = Vec3A::from(view.eye_m);
+        let mut here = knot(from);
+        loop {
+            let to = (from + KNOTS_PX).min(last);
+            let (there, step) = if to > from {
+                let there = knot(to);
+                (there, here.step_to(&there, (to - from) as f32))
+            } else {
+                (here, here)
+            };
+            // The last pixel of a run stands for itself.
+            for column in from..to.max(from + 1) {
+                let knot = here.plus(&step, (column - from) as i32 as f32);
+                let from_eye_m = row.ray(column) / nearness[column];
+                radiance[column] = self.pixel(lit, &knot, from_eye_m, eye_m, openness[column]);
+            }
+            if to == from {
+                return;
+            }
+            (from, here) = (to, there);
         }
     }
 
@@ -96,63 +200,84 @@ impl Lighting<'_> {
         let normal = Vec3A::from(facet.normal);
         let upward = 0.5 + 0.5 * normal.z;
         let is_braking = facet.body.is_some_and(|body| (self.is_braking)(body));
+        let surface = Surface::new(facet);
         Lit {
-            surface: Surface::new(facet),
+            texture: facet.texture,
             normal,
             ambient: light.below.lerp(light.above, upward),
             sun: light.sun * normal.dot(light.sun_direction).max(0.0),
             emission: glow(light, facet.material, is_braking),
             faces_up: normal.z > 0.8,
+            is_shiny: surface.is_shiny(),
+            surface,
+        }
+    }
+
+    fn knot(&self, view: &View, lit: &Lit, ray: Vec3A, nearness: f32) -> Knot {
+        let light = self.light;
+        let depth_m = 1.0 / nearness;
+        let from_eye_m = ray * depth_m;
+        let distance_m = from_eye_m.length();
+        let direction = from_eye_m / distance_m;
+        let facing = (-direction.dot(lit.normal)).max(0.02);
+        let footprint_m = depth_m / (view.focal_px.x * facing.sqrt());
+        let left = fade(light.haze_per_m * distance_m);
+        // Rain in the beam of the head lamps: most of it comes from the first metres.
+        let veil = self.veil(direction) * (1.0 - fade(distance_m * 0.3));
+        let mut lamps = Vec3A::ZERO;
+        if light.exposure > 2.0 {
+            let place_m = from_eye_m + Vec3A::from(view.eye_m);
+            let height_m = place_m.z - self.ground_m;
+            let share = if lit.faces_up { 1.0 } else { 0.5 } * smooth(9.0, 4.0, height_m);
+            lamps = self.lamps.at(place_m.x, place_m.y) * share;
+            lamps += self.beam.on(from_eye_m, lit.normal);
+        }
+        let (mut mirrored, mut gloss) = (Vec3A::ZERO, 0.0);
+        if lit.is_shiny {
+            let away_z = direction.z + lit.normal.z * (2.0 * facing);
+            mirrored = light.horizon.lerp(light.zenith, smooth(0.0, 0.9, away_z));
+            mirrored = if away_z > 0.0 { mirrored } else { light.below * 0.4 };
+            gloss = 0.6 * (1.0 - facing).powi(4);
+        }
+        Knot {
+            air: Vec3A::new(left, footprint_m, gloss),
+            lamps,
+            mirrored,
+            added: lit.emission * left + light.horizon * (1.0 - left) + Vec3A::splat(veil),
         }
     }
 
     #[inline]
     fn pixel(
         &self,
-        view: &View,
-        facet: &Facet,
         lit: &Lit,
-        ray: Vec3A,
-        depth_m: f32,
+        knot: &Knot,
+        from_eye_m: Vec3A,
+        eye_m: Vec3A,
         openness: f32,
     ) -> Vec3A {
         let light = self.light;
-        let from_eye_m = ray * depth_m;
-        let place_m = from_eye_m + Vec3A::from(view.eye_m);
-        let distance_m = from_eye_m.length();
-        let direction = from_eye_m / distance_m;
-        let facing = (-direction.dot(lit.normal)).max(0.02);
-        let footprint_m = depth_m / (view.focal_px.x * facing.sqrt());
-        let texture_m = || facet.texture.at_m(Vec3::from(from_eye_m));
+        let [left, footprint_m, gloss] = knot.air.to_array();
+        let place_m = from_eye_m + eye_m;
+        let texture_m = || lit.texture.at_m(Vec3::from(from_eye_m));
         let look = lit.surface.look(self.grain, place_m, texture_m, footprint_m);
-
-        let mut arriving = lit.ambient * openness;
+        let mut arriving = lit.ambient * openness + knot.lamps;
         if lit.sun.x > 0.0 {
             arriving += lit.sun * self.shadows.sunlight(place_m, lit.normal);
         }
-        if light.exposure > 2.0 {
-            let height_m = place_m.z - self.ground_m;
-            let share = if lit.faces_up { 1.0 } else { 0.5 } * smooth(9.0, 4.0, height_m);
-            arriving += self.lamps.at(place_m.x, place_m.y) * share;
-            arriving += self.beam.on(from_eye_m, lit.normal);
-        }
         // Water darkens what it soaks.
         let soaked = 1.0 - 0.35 * light.wetness;
-        let mut colour = look.albedo * soaked * arriving + lit.emission;
+        let mut colour = look.albedo * arriving * soaked;
         if look.mirror > 0.0 {
-            let fresnel = look.mirror + (1.0 - look.mirror) * (1.0 - facing).powi(4) * 0.6;
-            let away = direction + lit.normal * (2.0 * facing);
-            let mirrored = light.horizon.lerp(light.zenith, smooth(0.0, 0.9, away.z));
-            let mirrored = if away.z > 0.0 { mirrored } else { light.below * 0.4 };
             let fresnel = if look.lit > 0.0 {
                 look.mirror * 0.5
             } else {
-                fresnel * look.mirror.min(0.3) * 3.0
+                (look.mirror + (1.0 - look.mirror) * gloss) * look.mirror.min(0.3) * 3.0
             };
-            colour = colour * (1.0 - 0.5 * fresnel) + mirrored * fresnel;
+            colour = colour * (1.0 - 0.5 * fresnel) + knot.mirrored * fresnel;
             colour += Vec3A::new(0.34, 0.24, 0.11) * (look.lit * light.windows);
         }
-        self.haze(colour, direction, distance_m)
+        colour * left + knot.added
     }
 
     /// What rain throws back of the light of the own head lamps.
@@ -162,15 +287,5 @@ impl Lighting<'_> {
             return 0.0;
         }
         self.beam.veil(direction) * self.light.haze_per_m * VEIL
-    }
-
-    /// What is left of a colour, and what the air adds on the way.
-    #[inline]
-    fn haze(&self, colour: Vec3A, direction: Vec3A, distance_m: f32) -> Vec3A {
-        let left = fade(self.light.haze_per_m * distance_m);
-        // Rain in the beam of the head lamps: most of it comes from the first metres.
-        let veil = self.veil(direction);
-        let near = fade(distance_m * 0.3);
-        colour * left + self.light.horizon * (1.0 - left) + Vec3A::splat(veil * (1.0 - near))
     }
 }
