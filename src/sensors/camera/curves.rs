@@ -27,7 +27,7 @@ pub fn floor(value: f32) -> i32 {
 }
 
 /// Floats of this size are whole: to add it rounds, quicker than any conversion.
-const WHOLE: f32 = (3 << 22) as f32;
+pub const WHOLE: f32 = (3 << 22) as f32;
 
 /// The whole number below, and what is left, in [0, 1]; for numbers within 4 million. A whole number
 /// itself may be seen as the end of the step before.

@@ -11,7 +11,7 @@ use crate::{
     sensors::camera::{
         curves::split,
         light::{Light, luminance},
-        raster::Visibility,
+        raster::{Bounds, Visibility},
     },
 };
 
@@ -46,13 +46,19 @@ struct Area {
 pub struct Shadows {
     map: Visibility,
     places_px: Vec<Vec3>,
+    bounds: Vec<Bounds>,
     /// `None` where no sun shines.
     area: Option<Area>,
 }
 
 impl Default for Shadows {
     fn default() -> Shadows {
-        Shadows { map: Visibility::new(SIDE, SIDE), places_px: Vec::new(), area: None }
+        Shadows {
+            map: Visibility::new(SIDE, SIDE),
+            places_px: Vec::new(),
+            bounds: Vec::new(),
+            area: None,
+        }
     }
 }
 
@@ -120,9 +126,15 @@ impl Shadows {
         let place_px = |vertex: &Vertex| map_from_mesh.transform_point3(vertex.position_m);
         self.places_px.clear();
         self.places_px.extend(mesh.vertices.iter().map(place_px));
+        self.bounds.clear();
+        self.bounds.extend(self.places_px.iter().map(|place| Bounds::at(place.truncate())));
         for triangle in mesh.triangles.iter().filter(|triangle| throws_shadow(triangle.material)) {
-            let corners = triangle.corners.map(|corner| self.places_px[corner as usize]);
-            self.map.draw_flat(corners);
+            let [a, b, c] = triangle.corners;
+            let (a, b, c) = (a as usize, b as usize, c as usize);
+            let (bounds, places_px) = (&self.bounds[..], &self.places_px[..]);
+            if Bounds::hold_a_centre(bounds[a], bounds[b], bounds[c], SIDE, SIDE) {
+                self.map.draw_flat([places_px[a], places_px[b], places_px[c]]);
+            }
         }
     }
 
