@@ -2,17 +2,29 @@
 
 use glam::Vec3A;
 
+/// The lesser of two numbers; without the care that [`f32::min`] takes of what is none, which costs.
+#[inline]
+pub fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers.
+#[inline]
+pub fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 /// 0 below `from`, 1 above `to`, smooth in between.
 #[inline]
 pub fn smooth(from: f32, to: f32, value: f32) -> f32 {
-    let share = ((value - from) / (to - from)).clamp(0.0, 1.0);
+    let share = least(most((value - from) / (to - from), 0.0), 1.0);
     share * share * (3.0 - 2.0 * share)
 }
 
 /// exp(-x) for x >= 0, to 3 % of 1 and 0 beyond 16: much faster, and as good for haze.
 #[inline]
 pub fn fade(x: f32) -> f32 {
-    let root = (1.0 - x * (1.0 / 16.0)).max(0.0);
+    let root = most(1.0 - x * (1.0 / 16.0), 0.0);
     let square = root * root;
     let fourth = square * square;
     let eighth = fourth * fourth;
@@ -55,7 +67,7 @@ pub struct Stretch {
 impl Stretch {
     #[inline]
     pub fn new(width: f32) -> Stretch {
-        let width = width.max(1e-3);
+        let width = most(width, 1e-3);
         Stretch { width, per_width: 1.0 / width }
     }
 }
@@ -68,30 +80,35 @@ impl Bars {
     /// Share of a stretch around `place` that bars cover.
     #[inline]
     pub fn share(&self, place: f32, stretch: Stretch) -> f32 {
-        self.shares(place, [0.0], stretch)[0]
+        self.share_of(self.width, self.off(place), place, stretch)
     }
 
-    /// The same for bars that are wider by so much on each side.
+    /// The same, and that of bars which are wider by so much on each side.
     #[inline]
-    pub fn shares<const N: usize>(
-        &self,
-        place: f32,
-        wider: [f32; N],
-        stretch: Stretch,
-    ) -> [f32; N] {
-        let from_middle = place - 0.5 * self.width;
-        let (_, into) = split(from_middle * self.per_period + 0.5);
-        let off = (into - 0.5).abs() * self.period;
-        wider.map(|wider| {
-            let width = self.width + 2.0 * wider;
-            let covered = if stretch.width < self.period - width {
-                // It meets one bar at most.
-                (0.5 * (width + stretch.width) - off).min(width).min(stretch.width)
-            } else {
-                self.covered(from_middle + 0.5 * width, width, stretch)
-            };
-            (covered * stretch.per_width).clamp(0.0, 1.0)
-        })
+    pub fn shares(&self, place: f32, wider: f32, stretch: Stretch) -> [f32; 2] {
+        let off = self.off(place);
+        let share = self.share_of(self.width, off, place, stretch);
+        [share, self.share_of(self.width + 2.0 * wider, off, place + wider, stretch)]
+    }
+
+    /// How far it is to the middle of the nearest bar.
+    #[inline]
+    fn off(&self, place: f32) -> f32 {
+        let (_, into) = split((place - 0.5 * self.width) * self.per_period + 0.5);
+        (into - 0.5).abs() * self.period
+    }
+
+    /// Share that bars of another width cover, around a place counted from their start.
+    #[inline]
+    fn share_of(&self, width: f32, off: f32, place: f32, stretch: Stretch) -> f32 {
+        let covered = if stretch.width < self.period - width {
+            // It meets one bar at most.
+            let reach = 0.5 * (width + stretch.width) - off;
+            least(reach, least(width, stretch.width))
+        } else {
+            self.covered(place, width, stretch)
+        };
+        least(most(covered * stretch.per_width, 0.0), 1.0)
     }
 
     /// How much of a stretch bars of another width cover, around a place counted from their start.

@@ -2,7 +2,7 @@
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::curves::split,
+    sensors::camera::curves::{most, split},
 };
 
 /// Texels along a side of the finest level, a power of two.
@@ -66,7 +66,7 @@ impl Grain {
     /// The value at a place, both in texels, as a pixel sees it that covers `footprint` texels.
     #[inline]
     pub fn at(&self, x: f32, y: f32, footprint: f32) -> f32 {
-        let exponent = (footprint.max(1.0).to_bits() >> 23) - 127;
+        let exponent = (most(footprint, 1.0).to_bits() >> 23) - 127;
         let Some(level) = self.levels.get(exponent as usize) else { return 0.0 };
         // 2 to the power of -exponent.
         let scale = f32::from_bits((127 - exponent) << 23);

@@ -6,7 +6,7 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use crate::sensors::camera::{
-    curves::WHOLE,
+    curves::{self, WHOLE, least},
     view::{NEAR_M, View},
 };
 
@@ -190,10 +190,7 @@ impl Visibility {
         let nearness = &mut self.nearness[start + from..start + to];
         let Surface { plane, most, facet: this } = *surface;
         let base = plane.x * (from as f32 + 0.5) + (plane.y * (row as f32 + 0.5) + plane.z);
-        let mine = |i: usize| {
-            let mine = base + plane.x * i as i32 as f32;
-            if mine < most { mine } else { most }
-        };
+        let mine = |i: usize| least(base + plane.x * i as i32 as f32, most);
         if IS_KEPT {
             let facet = &mut self.facet[start + from..start + to];
             for (i, (nearness, facet)) in nearness.iter_mut().zip(facet).enumerate() {
@@ -201,12 +198,12 @@ impl Visibility {
                 // All bits where it is nearer: a choice that takes no branch.
                 let chosen = 0_u32.wrapping_sub(u32::from(mine > *nearness));
                 *facet = (this & chosen) | (*facet & !chosen);
-                *nearness = if mine > *nearness { mine } else { *nearness };
+                *nearness = curves::most(mine, *nearness);
             }
         } else {
             for (i, nearness) in nearness.iter_mut().enumerate() {
                 let mine = mine(i);
-                *nearness = if mine > *nearness { mine } else { *nearness };
+                *nearness = curves::most(mine, *nearness);
             }
         }
     }

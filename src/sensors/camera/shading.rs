@@ -24,6 +24,9 @@ const VEIL: f32 = 0.009;
 const KNOTS_PX: usize = 8;
 const SKY_KNOTS_PX: usize = 4;
 
+/// On so few pixels it does not change.
+const SHORT_PX: usize = 3;
+
 /// Everything that lights a picture.
 pub struct Lighting<'a> {
     pub light: &'a Light,
@@ -164,10 +167,18 @@ impl Lighting<'_> {
         openness: &[f32],
         radiance: &mut [Vec3A],
     ) {
-        let last = run.end - 1;
-        let mut from = run.start;
         let knot = |column: usize| self.knot(view, lit, row.ray(column), nearness[column]);
         let eye_m = Vec3A::from(view.eye_m);
+        if run.len() <= SHORT_PX {
+            let knot = knot((run.start + run.end) / 2);
+            for column in run {
+                let from_eye_m = row.ray(column) / nearness[column];
+                radiance[column] = self.pixel(lit, &knot, from_eye_m, eye_m, openness[column]);
+            }
+            return;
+        }
+        let last = run.end - 1;
+        let mut from = run.start;
         let mut here = knot(from);
         loop {
             let to = (from + KNOTS_PX).min(last);

@@ -71,9 +71,8 @@ impl Windows {
     #[inline]
     fn shares(&self, along_m: f32, up_m: f32, footprint_m: f32) -> [f32; 2] {
         let footprint = Stretch::new(footprint_m);
-        let wider = [0.0, FRAME_M];
-        let across = self.across.shares(along_m - self.margin_m, wider, footprint);
-        let upward = self.upward.shares(up_m - self.sill_m, wider, footprint);
+        let across = self.across.shares(along_m - self.margin_m, FRAME_M, footprint);
+        let upward = self.upward.shares(up_m - self.sill_m, FRAME_M, footprint);
         let (glass, framed) = (across[0] * upward[0], across[1] * upward[1]);
         [glass, (framed - glass).max(0.0)]
     }
