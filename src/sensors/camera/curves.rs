@@ -17,7 +17,7 @@ pub fn most(a: f32, b: f32) -> f32 {
 /// 0 below `from`, 1 above `to`, smooth in between.
 #[inline]
 pub fn smooth(from: f32, to: f32, value: f32) -> f32 {
-    let share = least(most((value - from) / (to - from), 0.0), 1.0);
+    let share = least(most((value - from) * (1.0 / (to - from)), 0.0), 1.0);
     share * share * (3.0 - 2.0 * share)
 }
 

@@ -239,7 +239,8 @@ impl Edge {
 /// The first pixel of a row or column whose centre lies at or beyond a place; `end` if none does.
 #[inline]
 fn first_centre(place_px: f32, end: usize) -> usize {
-    let from = (place_px - 0.5).max(0.0).min(end as f32);
-    let below = from as i32;
-    (below + i32::from((below as f32) < from)) as usize
+    let from = least(curves::most(place_px - 0.5, 0.0), end as f32);
+    let rounded = from + WHOLE;
+    let whole = rounded.to_bits().wrapping_sub(WHOLE.to_bits());
+    (whole + u32::from(rounded - WHOLE < from)) as usize
 }

@@ -51,6 +51,8 @@ struct Lit {
     ambient: Vec3A,
     sun: Vec3A,
     emission: Vec3A,
+    /// Share of light that water leaves.
+    soaked: f32,
     faces_up: bool,
     is_shiny: bool,
 }
@@ -69,19 +71,42 @@ struct Knot {
     added: Vec3A,
 }
 
-impl Knot {
-    fn plus(&self, step: &Knot, steps: f32) -> Knot {
-        Knot {
-            air: self.air + step.air * steps,
-            lamps: self.lamps + step.lamps * steps,
-            mirrored: self.mirrored + step.mirrored * steps,
-            added: self.added + step.added * steps,
-        }
+/// A place between two knots: what is at the first, and how it grows by each pixel.
+struct Between<'k> {
+    knot: &'k Knot,
+    growth: &'k Knot,
+    pixels: f32,
+}
+
+impl Between<'_> {
+    #[inline]
+    fn air(&self) -> Vec3A {
+        self.knot.air + self.growth.air * self.pixels
     }
 
-    /// The step from this one to another that is so many steps away.
-    fn step_to(&self, other: &Knot, steps: f32) -> Knot {
-        let share = 1.0 / steps;
+    #[inline]
+    fn lamps(&self) -> Vec3A {
+        self.knot.lamps + self.growth.lamps * self.pixels
+    }
+
+    #[inline]
+    fn mirrored(&self) -> Vec3A {
+        self.knot.mirrored + self.growth.mirrored * self.pixels
+    }
+
+    #[inline]
+    fn added(&self) -> Vec3A {
+        self.knot.added + self.growth.added * self.pixels
+    }
+}
+
+impl Knot {
+    const SAME: Knot =
+        Knot { air: Vec3A::ZERO, lamps: Vec3A::ZERO, mirrored: Vec3A::ZERO, added: Vec3A::ZERO };
+
+    /// How it grows by each pixel on the way to another that is so many away.
+    fn growth_to(&self, other: &Knot, pixels: usize) -> Knot {
+        let share = 1.0 / pixels as f32;
         Knot {
             air: (other.air - self.air) * share,
             lamps: (other.lamps - self.lamps) * share,
@@ -169,35 +194,28 @@ impl Lighting<'_> {
     ) {
         let knot = |column: usize| self.knot(view, lit, row.ray(column), nearness[column]);
         let eye_m = Vec3A::from(view.eye_m);
-        if run.len() <= SHORT_PX {
-            let knot = knot((run.start + run.end) / 2);
-            for column in run {
-                let from_eye_m = row.ray(column) / nearness[column];
-                radiance[column] = self.pixel(lit, &knot, from_eye_m, eye_m, openness[column]);
-            }
-            return;
-        }
-        let last = run.end - 1;
+        let is_short = run.len() <= SHORT_PX;
         let mut from = run.start;
-        let mut here = knot(from);
-        loop {
-            let to = (from + KNOTS_PX).min(last);
-            let (there, step) = if to > from {
-                let there = knot(to);
-                (there, here.step_to(&there, (to - from) as f32))
+        let mut here = knot(if is_short { (from + run.end) / 2 } else { from });
+        while from < run.end {
+            let to = if is_short { run.end } else { (from + KNOTS_PX).min(run.end - 1) };
+            // The last pixel of a long run stands for itself.
+            let (there, growth, end) = if is_short || to == from {
+                (here, Knot::SAME, run.end)
             } else {
-                (here, here)
+                let there = knot(to);
+                (there, here.growth_to(&there, to - from), to)
             };
-            // The last pixel of a run stands for itself.
-            for column in from..to.max(from + 1) {
-                let knot = here.plus(&step, (column - from) as i32 as f32);
-                let from_eye_m = row.ray(column) / nearness[column];
-                radiance[column] = self.pixel(lit, &knot, from_eye_m, eye_m, openness[column]);
+            let (nearness, openness) = (&nearness[from..end], &openness[from..end]);
+            let pixels = radiance[from..end].iter_mut().zip(nearness).zip(openness);
+            let mut ray = row.ray(from);
+            let mut between = Between { knot: &here, growth: &growth, pixels: 0.0 };
+            for ((pixel, nearness), openness) in pixels {
+                *pixel = self.pixel(lit, &between, ray * (1.0 / nearness), eye_m, *openness);
+                ray += row.across;
+                between.pixels += 1.0;
             }
-            if to == from {
-                return;
-            }
-            (from, here) = (to, there);
+            (from, here) = (end, there);
         }
     }
 
@@ -212,11 +230,14 @@ impl Lighting<'_> {
         let upward = 0.5 + 0.5 * normal.z;
         let is_braking = facet.body.is_some_and(|body| (self.is_braking)(body));
         let surface = Surface::new(facet);
+        // Water darkens what it soaks.
+        let soaked = 1.0 - 0.35 * light.wetness;
         Lit {
             texture: facet.texture,
             normal,
-            ambient: light.below.lerp(light.above, upward),
-            sun: light.sun * normal.dot(light.sun_direction).max(0.0),
+            ambient: light.below.lerp(light.above, upward) * soaked,
+            sun: light.sun * (soaked * normal.dot(light.sun_direction).max(0.0)),
+            soaked,
             emission: glow(light, facet.material, is_braking),
             faces_up: normal.z > 0.8,
             is_shiny: surface.is_shiny(),
@@ -242,6 +263,7 @@ impl Lighting<'_> {
             let share = if lit.faces_up { 1.0 } else { 0.5 } * smooth(9.0, 4.0, height_m);
             lamps = self.lamps.at(place_m.x, place_m.y) * share;
             lamps += self.beam.on(from_eye_m, lit.normal);
+            lamps *= lit.soaked;
         }
         let (mut mirrored, mut gloss) = (Vec3A::ZERO, 0.0);
         if lit.is_shiny {
@@ -262,33 +284,34 @@ impl Lighting<'_> {
     fn pixel(
         &self,
         lit: &Lit,
-        knot: &Knot,
+        between: &Between,
         from_eye_m: Vec3A,
         eye_m: Vec3A,
         openness: f32,
     ) -> Vec3A {
         let light = self.light;
-        let [left, footprint_m, gloss] = knot.air.to_array();
+        let [left, footprint_m, gloss] = between.air().to_array();
         let place_m = from_eye_m + eye_m;
         let texture_m = || lit.texture.at_m(Vec3::from(from_eye_m));
         let look = lit.surface.look(self.grain, place_m, texture_m, footprint_m);
-        let mut arriving = lit.ambient * openness + knot.lamps;
+        let mut arriving = lit.ambient * openness;
         if lit.sun.x > 0.0 {
             arriving += lit.sun * self.shadows.sunlight(place_m, lit.normal);
         }
-        // Water darkens what it soaks.
-        let soaked = 1.0 - 0.35 * light.wetness;
-        let mut colour = look.albedo * arriving * soaked;
+        if light.exposure > 2.0 {
+            arriving += between.lamps();
+        }
+        let mut colour = look.albedo * arriving;
         if look.mirror > 0.0 {
             let fresnel = if look.lit > 0.0 {
                 look.mirror * 0.5
             } else {
                 (look.mirror + (1.0 - look.mirror) * gloss) * look.mirror.min(0.3) * 3.0
             };
-            colour = colour * (1.0 - 0.5 * fresnel) + knot.mirrored * fresnel;
+            colour = colour * (1.0 - 0.5 * fresnel) + between.mirrored() * fresnel;
             colour += Vec3A::new(0.34, 0.24, 0.11) * (look.lit * light.windows);
         }
-        colour * left + knot.added
+        colour * left + between.added()
     }
 
     /// What rain throws back of the light of the own head lamps.
