@@ -21,7 +21,7 @@ use crate::sensors::camera::{
 const VEIL: f32 = 0.009;
 
 /// Light is worked out once for so many pixels of a row of a facet, or of the sky.
-const KNOTS_PX: usize = 8;
+const KNOTS_PX: usize = 16;
 const SKY_KNOTS_PX: usize = 4;
 
 /// On so few pixels it does not change.

@@ -71,8 +71,11 @@ impl Windows {
     #[inline]
     fn shares(&self, along_m: f32, up_m: f32, footprint_m: f32) -> [f32; 2] {
         let footprint = Stretch::new(footprint_m);
-        let across = self.across.shares(along_m - self.margin_m, FRAME_M, footprint);
         let upward = self.upward.shares(up_m - self.sill_m, FRAME_M, footprint);
+        if upward[1] == 0.0 {
+            return [0.0; 2];
+        }
+        let across = self.across.shares(along_m - self.margin_m, FRAME_M, footprint);
         let (glass, framed) = (across[0] * upward[0], across[1] * upward[1]);
         [glass, (framed - glass).max(0.0)]
     }
