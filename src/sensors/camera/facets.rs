@@ -150,10 +150,10 @@ impl Texture {
         Texture { along, up, origin_m }
     }
 
-    /// Coordinates of a place on the surface, m.
+    /// How coordinates on the surface change with a way in the world, both m.
     #[inline]
-    pub fn at_m(&self, from_eye_m: Vec3) -> Vec2 {
-        self.origin_m + Vec2::new(self.along.dot(from_eye_m), self.up.dot(from_eye_m))
+    pub fn growth_m(&self, way_m: Vec3) -> Vec2 {
+        Vec2::new(self.along.dot(way_m), self.up.dot(way_m))
     }
 }
 

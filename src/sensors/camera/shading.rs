@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3A};
 
 use crate::sensors::camera::{
     curves::{fade, smooth},
@@ -23,6 +23,9 @@ const VEIL: f32 = 0.009;
 /// Light is worked out once for so many pixels of a row of a facet, or of the sky.
 const KNOTS_PX: usize = 16;
 const SKY_KNOTS_PX: usize = 4;
+
+/// Shadows are looked up so far before a surface, m.
+const OFF_SURFACE_M: f32 = 0.06;
 
 /// On so few pixels it does not change.
 const SHORT_PX: usize = 3;
@@ -47,6 +50,8 @@ struct Lit {
     surface: Surface,
     texture: Texture,
     normal: Vec3A,
+    /// The eye.
+    eye: Place,
     /// Light from sky and ground, and from the sun where nothing stands before it.
     ambient: Vec3A,
     sun: Vec3A,
@@ -129,6 +134,28 @@ impl Row {
     }
 }
 
+/// A place, or how places change, in three frames.
+#[derive(Clone, Copy)]
+struct Place {
+    /// m.
+    world: Vec3A,
+    /// On the surface, m.
+    texture: Vec2,
+    /// On the map of shadows.
+    shadow: Vec3A,
+}
+
+impl Place {
+    #[inline]
+    fn plus(&self, change: &Place, times: f32) -> Place {
+        Place {
+            world: self.world + change.world * times,
+            texture: self.texture + change.texture * times,
+            shadow: self.shadow + change.shadow * times,
+        }
+    }
+}
+
 impl Lighting<'_> {
     /// Radiance of all pixels, row by row; `openness` is the share of the sky that the ground there
     /// sees past bodies.
@@ -157,7 +184,7 @@ impl Lighting<'_> {
                 if this == NOTHING {
                     self.shade_sky(&row, run, radiance);
                 } else {
-                    let lit = self.prepare(&facets[this as usize]);
+                    let lit = self.prepare(view, &facets[this as usize]);
                     self.shade_facet(view, &lit, &row, run, nearness, openness, radiance);
                 }
                 from = end;
@@ -193,7 +220,7 @@ impl Lighting<'_> {
         radiance: &mut [Vec3A],
     ) {
         let knot = |column: usize| self.knot(view, lit, row.ray(column), nearness[column]);
-        let eye_m = Vec3A::from(view.eye_m);
+        let across = self.change(lit, row.across);
         let is_short = run.len() <= SHORT_PX;
         let mut from = run.start;
         let mut here = knot(if is_short { (from + run.end) / 2 } else { from });
@@ -208,14 +235,24 @@ impl Lighting<'_> {
             };
             let (nearness, openness) = (&nearness[from..end], &openness[from..end]);
             let pixels = radiance[from..end].iter_mut().zip(nearness).zip(openness);
-            let mut ray = row.ray(from);
+            let mut ray = self.change(lit, row.ray(from));
             let mut between = Between { knot: &here, growth: &growth, pixels: 0.0 };
             for ((pixel, nearness), openness) in pixels {
-                *pixel = self.pixel(lit, &between, ray * (1.0 / nearness), eye_m, *openness);
-                ray += row.across;
+                let place = lit.eye.plus(&ray, 1.0 / nearness);
+                *pixel = self.pixel(lit, &between, &place, *openness);
+                ray = ray.plus(&across, 1.0);
                 between.pixels += 1.0;
             }
             (from, here) = (end, there);
+        }
+    }
+
+    /// How a place changes in all frames with a way in the world, m.
+    fn change(&self, lit: &Lit, way_m: Vec3A) -> Place {
+        Place {
+            world: way_m,
+            texture: lit.texture.growth_m(way_m.into()),
+            shadow: self.shadows.change(way_m),
         }
     }
 
@@ -224,7 +261,7 @@ impl Lighting<'_> {
         sky::radiance(self.light, self.grain, direction, self.drift) + Vec3A::splat(veil)
     }
 
-    fn prepare(&self, facet: &Facet) -> Lit {
+    fn prepare(&self, view: &View, facet: &Facet) -> Lit {
         let light = self.light;
         let normal = Vec3A::from(facet.normal);
         let upward = 0.5 + 0.5 * normal.z;
@@ -232,9 +269,16 @@ impl Lighting<'_> {
         let surface = Surface::new(facet);
         // Water darkens what it soaks.
         let soaked = 1.0 - 0.35 * light.wetness;
+        let eye_m = Vec3A::from(view.eye_m);
+        let eye = Place {
+            world: eye_m,
+            texture: facet.texture.origin_m,
+            shadow: self.shadows.place(eye_m + normal * OFF_SURFACE_M),
+        };
         Lit {
             texture: facet.texture,
             normal,
+            eye,
             ambient: light.below.lerp(light.above, upward) * soaked,
             sun: light.sun * (soaked * normal.dot(light.sun_direction).max(0.0)),
             soaked,
@@ -281,22 +325,13 @@ impl Lighting<'_> {
     }
 
     #[inline]
-    fn pixel(
-        &self,
-        lit: &Lit,
-        between: &Between,
-        from_eye_m: Vec3A,
-        eye_m: Vec3A,
-        openness: f32,
-    ) -> Vec3A {
+    fn pixel(&self, lit: &Lit, between: &Between, place: &Place, openness: f32) -> Vec3A {
         let light = self.light;
         let [left, footprint_m, gloss] = between.air().to_array();
-        let place_m = from_eye_m + eye_m;
-        let texture_m = || lit.texture.at_m(Vec3::from(from_eye_m));
-        let look = lit.surface.look(self.grain, place_m, texture_m, footprint_m);
+        let look = lit.surface.look(self.grain, place.world, place.texture, footprint_m);
         let mut arriving = lit.ambient * openness;
         if lit.sun.x > 0.0 {
-            arriving += lit.sun * self.shadows.sunlight(place_m, lit.normal);
+            arriving += lit.sun * self.shadows.sunlight(place.shadow);
         }
         if light.exposure > 2.0 {
             arriving += between.lamps();

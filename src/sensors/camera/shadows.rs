@@ -138,11 +138,24 @@ impl Shadows {
         }
     }
 
-    /// Share of the sun's light that arrives at a place, world frame, m.
+    /// A place of the world frame, m, on the map: texels, and height towards the sun, m.
     #[inline]
-    pub fn sunlight(&self, place_m: Vec3A, normal: Vec3A) -> f32 {
-        let Some(area) = &self.area else { return 1.0 };
-        let place = area.map_from_world.transform_point3a(place_m + normal * 0.06);
+    pub fn place(&self, place_m: Vec3A) -> Vec3A {
+        self.area.map_or(Vec3A::ZERO, |area| area.map_from_world.transform_point3a(place_m))
+    }
+
+    /// How places on the map change with a way in the world, m.
+    #[inline]
+    pub fn change(&self, way_m: Vec3A) -> Vec3A {
+        self.area.map_or(Vec3A::ZERO, |area| area.map_from_world.transform_vector3a(way_m))
+    }
+
+    /// Share of the sun's light that arrives at a place on the map.
+    #[inline]
+    pub fn sunlight(&self, place: Vec3A) -> f32 {
+        if self.area.is_none() {
+            return 1.0;
+        }
         let ((column, across), (row, up)) = (split(place.x - 0.5), split(place.y - 0.5));
         let inside = 0..SIDE as i32 - 1;
         if !inside.contains(&column) || !inside.contains(&row) {

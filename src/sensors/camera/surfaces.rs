@@ -114,13 +114,7 @@ impl Surface {
     /// At a place (world frame, m), seen by a pixel that covers `footprint_m`; `texture_m` gives
     /// coordinates on a wall.
     #[inline]
-    pub fn look(
-        &self,
-        grain: &Grain,
-        place_m: Vec3A,
-        texture_m: impl FnOnce() -> Vec2,
-        footprint_m: f32,
-    ) -> Look {
+    pub fn look(&self, grain: &Grain, place_m: Vec3A, texture_m: Vec2, footprint_m: f32) -> Look {
         let at = |texel_m: f32| {
             let scale = 1.0 / texel_m;
             grain.at(place_m.x * scale, place_m.y * scale, footprint_m * scale)
@@ -153,7 +147,7 @@ impl Surface {
                 plain(self.colour * tint * (1.0 + 0.5 * fine + 0.25 * broad))
             }
             Material::Facade => match &self.wall {
-                Some(wall) => wall.look(self.colour, grain, texture_m(), footprint_m),
+                Some(wall) => wall.look(self.colour, grain, texture_m, footprint_m),
                 None => plain(self.colour),
             },
             Material::Plaster if self.is_roof => {
