@@ -75,6 +75,11 @@ impl Visibility {
         Visibility { width, height, nearness, facet }
     }
 
+    /// Without facets, for [`Visibility::draw_flat`].
+    pub fn flat(width: usize, height: usize) -> Visibility {
+        Visibility { width, height, nearness: vec![0.0; width * height], facet: Vec::new() }
+    }
+
     pub fn clear(&mut self) {
         self.nearness.fill(0.0);
         self.facet.fill(NOTHING);

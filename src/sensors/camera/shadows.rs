@@ -54,7 +54,7 @@ pub struct Shadows {
 impl Default for Shadows {
     fn default() -> Shadows {
         Shadows {
-            map: Visibility::new(SIDE, SIDE),
+            map: Visibility::flat(SIDE, SIDE),
             places_px: Vec::new(),
             bounds: Vec::new(),
             area: None,
