@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::{curves::split, light::Light},
+    sensors::camera::{curves::WHOLE, light::Light},
 };
 
 /// Random numbers that are drawn once and used again from other places.
@@ -91,7 +91,9 @@ impl Sensor {
             // Less of it where there is light.
             let noise = (Vec3A::splat(1.3) - bright) * light.noise * Vec3A::from_array(*draws);
             let value = (bright * 255.0 + noise).clamp(Vec3A::ZERO, Vec3A::splat(255.0));
-            *bytes = value.to_array().map(|value| split(value + 0.5).0 as u8);
+            // The last bits are those of the nearest whole number.
+            let rounded = value + Vec3A::splat(WHOLE);
+            *bytes = rounded.to_array().map(|rounded| rounded.to_bits() as u8);
         }
     }
 }

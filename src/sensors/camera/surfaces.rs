@@ -124,7 +124,12 @@ impl Surface {
             Material::Asphalt => {
                 let (fine, broad) = (at(0.02), at(0.35));
                 let patches = smooth(0.12, 0.2, broad) * 0.1;
-                let crack = smooth(0.035, 0.0, broad.abs()) * smooth(0.12, 0.03, footprint_m);
+                // Seen from close alone.
+                let crack = if footprint_m < 0.12 {
+                    smooth(0.035, 0.0, broad.abs()) * smooth(0.12, 0.03, footprint_m)
+                } else {
+                    0.0
+                };
                 let shade = 1.0 + 0.25 * fine + 0.22 * broad - patches - 0.2 * crack;
                 plain(self.colour * (1.25 * shade))
             }
