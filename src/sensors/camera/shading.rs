@@ -8,13 +8,14 @@ use crate::sensors::camera::{
     curves::{fade, smooth},
     facets::{Facet, Texture},
     grain::Grain,
+    knots::{Between, Knot},
     lamps::{Beam, LightMap, glow},
     light::Light,
     raster::{NOTHING, Visibility},
     shadows::Shadows,
     sky,
     surfaces::Surface,
-    view::View,
+    view::{Row, View},
 };
 
 /// Share of the light of the own lamps that drops throw back into the camera.
@@ -62,78 +63,6 @@ struct Lit {
     is_shiny: bool,
 }
 
-/// What changes so slowly along a row of a facet that it is worked out at some pixels alone.
-#[derive(Clone, Copy)]
-struct Knot {
-    /// Share of the light that is left by the way through the air; breadth of the pixel on the
-    /// surface, m; how strongly a window mirrors at this angle beyond what it does facing it.
-    air: Vec3A,
-    /// What lamps throw, as it arrives.
-    lamps: Vec3A,
-    /// The sky that is mirrored.
-    mirrored: Vec3A,
-    /// What shines by itself, and what the air adds.
-    added: Vec3A,
-}
-
-/// A place between two knots: what is at the first, and how it grows by each pixel.
-struct Between<'k> {
-    knot: &'k Knot,
-    growth: &'k Knot,
-    pixels: f32,
-}
-
-impl Between<'_> {
-    #[inline]
-    fn air(&self) -> Vec3A {
-        self.knot.air + self.growth.air * self.pixels
-    }
-
-    #[inline]
-    fn lamps(&self) -> Vec3A {
-        self.knot.lamps + self.growth.lamps * self.pixels
-    }
-
-    #[inline]
-    fn mirrored(&self) -> Vec3A {
-        self.knot.mirrored + self.growth.mirrored * self.pixels
-    }
-
-    #[inline]
-    fn added(&self) -> Vec3A {
-        self.knot.added + self.growth.added * self.pixels
-    }
-}
-
-impl Knot {
-    const SAME: Knot =
-        Knot { air: Vec3A::ZERO, lamps: Vec3A::ZERO, mirrored: Vec3A::ZERO, added: Vec3A::ZERO };
-
-    /// How it grows by each pixel on the way to another that is so many away.
-    fn growth_to(&self, other: &Knot, pixels: usize) -> Knot {
-        let share = 1.0 / pixels as f32;
-        Knot {
-            air: (other.air - self.air) * share,
-            lamps: (other.lamps - self.lamps) * share,
-            mirrored: (other.mirrored - self.mirrored) * share,
-            added: (other.added - self.added) * share,
-        }
-    }
-}
-
-/// Where rays of a row go; 1 m ahead of the eye, world frame.
-struct Row {
-    first: Vec3A,
-    across: Vec3A,
-}
-
-impl Row {
-    #[inline]
-    fn ray(&self, column: usize) -> Vec3A {
-        self.first + self.across * column as i32 as f32
-    }
-}
-
 /// A place, or how places change, in three frames.
 #[derive(Clone, Copy)]
 struct Place {
@@ -167,11 +96,9 @@ impl Lighting<'_> {
         openness: &[f32],
         radiance: &mut [Vec3A],
     ) {
-        let across = Vec3A::from(view.world_from_camera.x_axis / view.focal_px.x);
         for number in 0..view.height {
             let pixels = number * view.width..(number + 1) * view.width;
-            let first = Vec3A::from(view.ray(Vec2::new(0.5, number as f32 + 0.5)));
-            let row = Row { first, across };
+            let row = view.row(number);
             let facet = &visibility.facet[pixels.clone()];
             let nearness = &visibility.nearness[pixels.clone()];
             let openness = &openness[pixels.clone()];

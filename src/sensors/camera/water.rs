@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{Vec2, Vec3A};
+use glam::Vec3A;
 
 use crate::{
     scene::mesh::Material,
@@ -12,7 +12,7 @@ use crate::{
         grain::Grain,
         light::Light,
         raster::{NOTHING, Visibility},
-        view::View,
+        view::{Row, View},
     },
 };
 
@@ -25,22 +25,6 @@ const LEVEL: f32 = 0.03;
 /// Mirrored rays are followed for one in so many pixels of a row: the water is not smooth enough to
 /// tell.
 const KNOTS_PX: usize = 4;
-
-/// A row of the picture: its number, the place of its first pixel, and where rays go; 1 m ahead of the
-/// eye, world frame.
-struct Row {
-    number: usize,
-    start: usize,
-    first: Vec3A,
-    across: Vec3A,
-}
-
-impl Row {
-    #[inline]
-    fn ray(&self, column: usize) -> Vec3A {
-        self.first + self.across * column as f32
-    }
-}
 
 /// What changes slowly along a row.
 #[derive(Clone, Copy)]
@@ -70,10 +54,9 @@ impl Water<'_> {
         // Only of a level camera do mirrored rays stay in their column.
         let axes = &view.world_from_camera;
         let is_level = axes.x_axis.z.abs() < LEVEL && axes.z_axis.z.abs() < LEVEL;
-        let across = axes.x_axis / view.focal_px.x;
         for row in 0..view.height {
-            let first = view.ray(Vec2::new(0.5, row as f32 + 0.5));
-            let start = row * view.width;
+            let row = view.row(row);
+            let start = row.number * view.width;
             let facets = &self.visibility.facet[start..start + view.width];
             let mut known = (NOTHING, false);
             let mut is_wet = |facet: u32| {
@@ -86,7 +69,6 @@ impl Water<'_> {
             while let Some(dry) = facets[from..].iter().position(|facet| is_wet(*facet)) {
                 from += dry;
                 let wet = facets[from..].iter().take_while(|facet| is_wet(**facet)).count();
-                let row = Row { number: row, start, first: first.into(), across: across.into() };
                 self.mirror(&row, from..from + wet, is_level, radiance);
                 from += wet;
             }
@@ -106,7 +88,9 @@ impl Water<'_> {
 
     /// Add what the pixels of a run mirror.
     fn mirror(&self, row: &Row, run: Range<usize>, is_level: bool, radiance: &mut [Vec3A]) {
-        let (light, nearness) = (self.light, &self.visibility.nearness[row.start..]);
+        let light = self.light;
+        let start = row.number * self.view.width;
+        let nearness = &self.visibility.nearness[start..];
         let eye_m = Vec3A::from(self.view.eye_m);
         let film = 0.42 * light.wetness;
         let last = run.end - 1;
@@ -130,7 +114,7 @@ impl Water<'_> {
                 let share_mirrored = strength * left;
                 let mirrored = here.mirrored.lerp(there.mirrored, share);
                 // Water that mirrors lets less light down to the ground.
-                let pixel = &mut radiance[row.start + column];
+                let pixel = &mut radiance[start + column];
                 *pixel = *pixel * (1.0 - 0.6 * share_mirrored) + mirrored * share_mirrored;
             }
             if to == from {
@@ -142,7 +126,7 @@ impl Water<'_> {
 
     fn knot(&self, row: &Row, column: usize, is_level: bool, radiance: &[Vec3A]) -> Knot {
         let (view, light) = (self.view, self.light);
-        let nearness = self.visibility.nearness[row.start + column];
+        let nearness = self.visibility.nearness[row.number * view.width + column];
         let from_eye_m = row.ray(column) / nearness;
         let distance_m = from_eye_m.length();
         let above_m = -from_eye_m.z;
