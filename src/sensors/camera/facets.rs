@@ -9,7 +9,7 @@ use crate::{
         surroundings::Surroundings,
     },
     sensors::camera::{
-        raster::{Corner, Visibility},
+        raster::{Bounds, Corner, Visibility},
         view::View,
     },
 };
@@ -42,6 +42,7 @@ pub struct Texture {
 pub struct Facets {
     pub facets: Vec<Facet>,
     corners: Vec<Corner>,
+    bounds: Vec<Bounds>,
 }
 
 impl Facets {
@@ -95,14 +96,22 @@ impl Facets {
         from_eye_m: &dyn Fn(&Vertex) -> Vec3,
         onto: &mut Visibility,
     ) {
+        self.bounds.clear();
+        self.bounds.extend(self.corners.iter().map(Bounds::of));
         for triangle in &mesh.triangles {
-            let places = triangle.corners.map(|corner| corner as usize);
-            let corners = places.map(|place| self.corners[place]);
+            let [a, b, c] = triangle.corners;
+            let (a, b, c) = (a as usize, b as usize, c as usize);
+            let bounds = &self.bounds[..];
+            let (width, height) = (view.width, view.height);
+            if !Bounds::hold_a_centre(bounds[a], bounds[b], bounds[c], width, height) {
+                continue;
+            }
+            let corners = [self.corners[a], self.corners[b], self.corners[c]];
             if !onto.draw(view, &corners, self.facets.len() as u32) {
                 continue;
             }
-            let vertices = places.map(|place| mesh.vertices[place]);
-            let at_m = [0, 1, 2].map(|i| from_eye_m(&vertices[i]));
+            let vertices = [&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]];
+            let at_m = vertices.map(from_eye_m);
             let normal = (at_m[1] - at_m[0]).cross(at_m[2] - at_m[0]);
             let painted = matches!(triangle.material, Material::Coachwork | Material::Jacket);
             let colour = body.filter(|_| painted).map_or(triangle.colour, |(_, colour)| colour);
@@ -141,10 +150,10 @@ impl Texture {
         Texture { along, up, origin_m }
     }
 
-    /// Coordinates of a place on the surface, m.
+    /// How coordinates on the surface change with a way in the world, both m.
     #[inline]
-    pub fn at_m(&self, from_eye_m: Vec3) -> Vec2 {
-        self.origin_m + Vec2::new(self.along.dot(from_eye_m), self.up.dot(from_eye_m))
+    pub fn growth_m(&self, way_m: Vec3) -> Vec2 {
+        Vec2::new(self.along.dot(way_m), self.up.dot(way_m))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::curves::floor,
+    sensors::camera::curves::{most, split},
 };
 
 /// Texels along a side of the finest level, a power of two.
@@ -12,8 +12,11 @@ const LEVELS: usize = 7;
 /// Values in [-1, 1] that repeat every `SIDE` texels, each level half as fine as the one before.
 #[derive(Clone, Debug)]
 pub struct Grain {
-    levels: Vec<Vec<f32>>,
+    levels: Vec<Vec<Patch>>,
 }
+
+/// Between a texel and its neighbours: the value there, and what it grows by across, down, and both.
+type Patch = [f32; 4];
 
 impl Default for Grain {
     fn default() -> Grain {
@@ -57,27 +60,36 @@ impl Grain {
             levels.push(coarser);
         }
         levels.iter_mut().flatten().for_each(|value| *value = value.clamp(-1.0, 1.0));
-        Grain { levels }
+        Grain { levels: levels.iter().map(|level| patches(level)).collect() }
     }
 
     /// The value at a place, both in texels, as a pixel sees it that covers `footprint` texels.
     #[inline]
     pub fn at(&self, x: f32, y: f32, footprint: f32) -> f32 {
-        let exponent = (footprint.max(1.0).to_bits() >> 23) as usize - 127;
-        let Some(level) = self.levels.get(exponent) else { return 0.0 };
-        let scale = 1.0 / (1 << exponent) as f32;
-        let (x, y) = (x * scale - 0.5, y * scale - 0.5);
-        let (left, top) = (floor(x), floor(y));
-        let (across, down) = (x - left as f32, y - top as f32);
-        let shift = SIDE.trailing_zeros() as usize - exponent;
+        let exponent = (most(footprint, 1.0).to_bits() >> 23) - 127;
+        let Some(level) = self.levels.get(exponent as usize) else { return 0.0 };
+        // 2 to the power of -exponent.
+        let scale = f32::from_bits((127 - exponent) << 23);
+        let ((left, across), (top, down)) = (split(x * scale - 0.5), split(y * scale - 0.5));
+        let shift = SIDE.trailing_zeros() - exponent;
         let mask = (1 << shift) - 1;
-        let (left, top) = (left as usize & mask, top as usize & mask);
-        let (right, bottom) = ((left + 1) & mask, (top + 1) & mask);
-        let at = |x: usize, y: usize| level[(y << shift) + x];
-        let above = at(left, top) + (at(right, top) - at(left, top)) * across;
-        let below = at(left, bottom) + (at(right, bottom) - at(left, bottom)) * across;
-        above + (below - above) * down
+        let place = ((top as u32 & mask) << shift) + (left as u32 & mask);
+        let [value, by_across, by_down, by_both] = level[place as usize];
+        value + by_across * across + (by_down + by_both * across) * down
     }
+}
+
+/// A level of texels, row by row, ready to be looked at between them.
+fn patches(level: &[f32]) -> Vec<Patch> {
+    let side = level.len().isqrt();
+    let at = |x: usize, y: usize| level[(y % side) * side + x % side];
+    let patch = |place: usize| {
+        let (x, y) = (place % side, place / side);
+        let (here, right) = (at(x, y), at(x + 1, y));
+        let (below, both) = (at(x, y + 1), at(x + 1, y + 1));
+        [here, right - here, below - here, here - right - below + both]
+    };
+    (0..level.len()).map(patch).collect()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub mod surfaces;
 pub mod lamps;
 pub mod shadows;
 pub mod contact;
+pub mod knots;
 pub mod shading;
 pub mod glows;
 pub mod water;

@@ -3,9 +3,12 @@
 //! A pixel shows what lies behind its centre. Triangles that share an edge find the same crossings of
 //! it with the rows, whatever their order, so no pixel between them is left out or drawn twice.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
-use crate::sensors::camera::view::{NEAR_M, View};
+use crate::sensors::camera::{
+    curves::{self, WHOLE, least},
+    view::{NEAR_M, View},
+};
 
 /// No facet: the sky.
 pub const NOTHING: u32 = u32::MAX;
@@ -21,6 +24,36 @@ impl Corner {
     #[inline]
     pub fn new(view: &View, seen_m: Vec3) -> Corner {
         Corner { seen_m, at_px: view.project_px(seen_m) }
+    }
+}
+
+/// The pixels whose centres may lie between corners: the first columns and rows at or beyond them, and
+/// those of the other ends, negative. Where it is not known, everything.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds(Vec4);
+
+impl Bounds {
+    /// Of a corner on the picture.
+    #[inline]
+    pub fn at(at_px: Vec2) -> Bounds {
+        // Numbers this large are outside any picture, and those below are rounded as they should be.
+        let from = (at_px - 0.5).clamp(Vec2::splat(-1e6), Vec2::splat(1e6));
+        let rounded = (from + WHOLE) - WHOLE;
+        let first = rounded + Vec2::select(rounded.cmplt(from), Vec2::ONE, Vec2::ZERO);
+        Bounds(Vec4::new(first.x, first.y, -first.x, -first.y))
+    }
+
+    #[inline]
+    pub fn of(corner: &Corner) -> Bounds {
+        if corner.seen_m.z < NEAR_M { Bounds(Vec4::INFINITY) } else { Bounds::at(corner.at_px) }
+    }
+
+    /// Whether there is a pixel of a picture whose centre may lie between three corners.
+    #[inline]
+    pub fn hold_a_centre(a: Bounds, b: Bounds, c: Bounds, width: usize, height: usize) -> bool {
+        let ends = a.0.max(b.0).max(c.0);
+        let outside = Vec4::new(0.0, 0.0, -(width as f32), -(height as f32));
+        ends.cmpgt(outside).all() && ends.x > -ends.z && ends.y > -ends.w
     }
 }
 
@@ -42,22 +75,23 @@ impl Visibility {
         Visibility { width, height, nearness, facet }
     }
 
+    /// Without facets, for [`Visibility::draw_flat`].
+    pub fn flat(width: usize, height: usize) -> Visibility {
+        Visibility { width, height, nearness: vec![0.0; width * height], facet: Vec::new() }
+    }
+
     pub fn clear(&mut self) {
         self.nearness.fill(0.0);
         self.facet.fill(NOTHING);
     }
 
-    /// Draw a triangle, if it faces the camera and lies over the centre of a pixel. Tells whether it
-    /// does, not whether it is seen.
+    /// Draw a triangle, if it faces the camera. Tells whether it does, not whether it is seen.
     #[inline]
     pub fn draw(&mut self, view: &View, corners: &[Corner; 3], facet: u32) -> bool {
         let [a, b, c] = corners;
-        let behind = [a, b, c].map(|corner| corner.seen_m.z < NEAR_M);
-        if behind == [false; 3] {
-            if !self.holds_a_centre(&corners.map(|corner| corner.at_px)) {
-                return false;
-            }
-        } else if behind == [true; 3] {
+        let nearest_m = a.seen_m.z.min(b.seen_m.z).min(c.seen_m.z);
+        let furthest_m = a.seen_m.z.max(b.seen_m.z).max(c.seen_m.z);
+        if furthest_m < NEAR_M {
             return false;
         }
         let normal = (b.seen_m - a.seen_m).cross(c.seen_m - a.seen_m);
@@ -70,10 +104,9 @@ impl Visibility {
         // 1 / depth is linear on the picture.
         let plane = Vec3::new(slope.x / view.focal_px.x, slope.y / view.focal_px.y, slope.z);
         let plane = plane.with_z(plane.z - plane.truncate().dot(view.centre_px));
-        let nearest_m = a.seen_m.z.min(b.seen_m.z).min(c.seen_m.z).max(NEAR_M);
-        let surface = Surface { plane, most: 1.0 / nearest_m, facet };
-        if behind == [false; 3] {
-            self.fill(&[a.at_px, b.at_px, c.at_px], &surface);
+        let surface = Surface { plane, most: 1.0 / nearest_m.max(NEAR_M), facet };
+        if nearest_m >= NEAR_M {
+            self.fill::<true>([a.at_px, b.at_px, c.at_px], &surface);
         } else {
             self.fill_clipped(view, corners, &surface);
         }
@@ -85,30 +118,14 @@ impl Visibility {
     #[inline]
     pub fn draw_flat(&mut self, corners: [Vec3; 3]) {
         let [a, b, c] = corners;
-        let at_px = corners.map(Vec3::truncate);
-        if !self.holds_a_centre(&at_px) {
-            return;
-        }
         let normal = (b - a).cross(c - a);
         if normal.z.abs() < 1e-6 {
             return;
         }
         let slope = -normal.truncate() / normal.z;
         let plane = slope.extend(a.z - slope.dot(a.truncate()));
-        self.fill(&at_px, &Surface { plane, most: a.z.max(b.z).max(c.z), facet: 0 });
-    }
-
-    /// Whether the box around a triangle holds the centre of a pixel.
-    #[inline]
-    fn holds_a_centre(&self, [a, b, c]: &[Vec2; 3]) -> bool {
-        let low = a.min(*b).min(*c);
-        let high = a.max(*b).max(*c);
-        let (width, height) = (self.width as f32, self.height as f32);
-        if !(high.x > 0.5 && low.x < width && high.y > 0.5 && low.y < height) {
-            return false;
-        }
-        first_centre(low.x, self.width) < first_centre(high.x, self.width)
-            && first_centre(low.y, self.height) < first_centre(high.y, self.height)
+        let surface = Surface { plane, most: a.z.max(b.z).max(c.z), facet: NOTHING };
+        self.fill::<false>([a.truncate(), b.truncate(), c.truncate()], &surface);
     }
 
     /// The part of a triangle in front of the near plane.
@@ -131,12 +148,13 @@ impl Visibility {
             }
         }
         for i in 2..count {
-            self.fill(&[outline[0], outline[i - 1], outline[i]], surface);
+            self.fill::<true>([outline[0], outline[i - 1], outline[i]], surface);
         }
     }
 
-    fn fill(&mut self, corners: &[Vec2; 3], surface: &Surface) {
-        let [mut top, mut middle, mut bottom] = *corners;
+    /// Fill a triangle; whether it is kept which facet it was.
+    fn fill<const IS_KEPT: bool>(&mut self, corners: [Vec2; 3], surface: &Surface) {
+        let [mut top, mut middle, mut bottom] = corners;
         if middle.y < top.y {
             std::mem::swap(&mut top, &mut middle);
         }
@@ -160,23 +178,38 @@ impl Visibility {
             let from = first_centre(left, self.width);
             let to = first_centre(right, self.width);
             if from < to {
-                self.fill_row(row, from, to, surface);
+                self.fill_row::<IS_KEPT>(row, from, to, surface);
             }
         }
     }
 
     #[inline]
-    fn fill_row(&mut self, row: usize, from: usize, to: usize, surface: &Surface) {
+    fn fill_row<const IS_KEPT: bool>(
+        &mut self,
+        row: usize,
+        from: usize,
+        to: usize,
+        surface: &Surface,
+    ) {
         let start = row * self.width;
         let nearness = &mut self.nearness[start + from..start + to];
-        let facet = &mut self.facet[start + from..start + to];
         let Surface { plane, most, facet: this } = *surface;
         let base = plane.x * (from as f32 + 0.5) + (plane.y * (row as f32 + 0.5) + plane.z);
-        for (i, (nearness, facet)) in nearness.iter_mut().zip(facet).enumerate() {
-            let mine = (base + plane.x * i as i32 as f32).min(most);
-            let is_nearer = mine > *nearness;
-            *nearness = if is_nearer { mine } else { *nearness };
-            *facet = if is_nearer { this } else { *facet };
+        let mine = |i: usize| least(base + plane.x * i as i32 as f32, most);
+        if IS_KEPT {
+            let facet = &mut self.facet[start + from..start + to];
+            for (i, (nearness, facet)) in nearness.iter_mut().zip(facet).enumerate() {
+                let mine = mine(i);
+                // All bits where it is nearer: a choice that takes no branch.
+                let chosen = 0_u32.wrapping_sub(u32::from(mine > *nearness));
+                *facet = (this & chosen) | (*facet & !chosen);
+                *nearness = curves::most(mine, *nearness);
+            }
+        } else {
+            for (i, nearness) in nearness.iter_mut().enumerate() {
+                let mine = mine(i);
+                *nearness = curves::most(mine, *nearness);
+            }
         }
     }
 }
@@ -211,7 +244,8 @@ impl Edge {
 /// The first pixel of a row or column whose centre lies at or beyond a place; `end` if none does.
 #[inline]
 fn first_centre(place_px: f32, end: usize) -> usize {
-    let from = (place_px - 0.5).max(0.0).min(end as f32);
-    let below = from as i32;
-    (below + i32::from((below as f32) < from)) as usize
+    let from = least(curves::most(place_px - 0.5, 0.0), end as f32);
+    let rounded = from + WHOLE;
+    let whole = rounded.to_bits().wrapping_sub(WHOLE.to_bits());
+    (whole + u32::from(rounded - WHOLE < from)) as usize
 }

@@ -1,17 +1,17 @@
 //! Shadows: of the sun, by looking from it, and below bodies, where little of the sky is seen.
 
-use glam::{Mat3, Vec2, Vec3, Vec3A};
+use glam::{Affine3A, Mat3, Vec3, Vec3A};
 
 use crate::{
     scene::{
         instant::Instant,
-        mesh::{Material, Mesh},
+        mesh::{Material, Mesh, Vertex},
         surroundings::Surroundings,
     },
     sensors::camera::{
-        curves::floor,
+        curves::split,
         light::{Light, luminance},
-        raster::Visibility,
+        raster::{Bounds, Visibility},
     },
 };
 
@@ -37,6 +37,8 @@ struct Area {
     /// Rows: across, up, towards the sun.
     sun_from_world: Mat3,
     middle_m: Vec3,
+    /// From the world frame, m: texels, and height towards the sun, m.
+    map_from_world: Affine3A,
 }
 
 /// How near to the sun the first surface is that meets its light, over an area ahead of the camera.
@@ -44,13 +46,19 @@ struct Area {
 pub struct Shadows {
     map: Visibility,
     places_px: Vec<Vec3>,
+    bounds: Vec<Bounds>,
     /// `None` where no sun shines.
     area: Option<Area>,
 }
 
 impl Default for Shadows {
     fn default() -> Shadows {
-        Shadows { map: Visibility::new(SIDE, SIDE), places_px: Vec::new(), area: None }
+        Shadows {
+            map: Visibility::flat(SIDE, SIDE),
+            places_px: Vec::new(),
+            bounds: Vec::new(),
+            area: None,
+        }
     }
 }
 
@@ -63,7 +71,12 @@ impl Area {
         // Texels keep their places in the world, so edges do not crawl.
         let middle = sun_from_world * middle_m;
         let snapped = (middle.truncate() / TEXEL_M).floor() * TEXEL_M;
-        Area { sun_from_world, middle_m: world_from_sun * snapped.extend(middle.z) }
+        let middle_m = world_from_sun * snapped.extend(middle.z);
+        let to_texels = Mat3::from_diagonal(Vec3::new(1.0 / TEXEL_M, 1.0 / TEXEL_M, 1.0));
+        let scaled = to_texels * sun_from_world;
+        let middle = Vec3::new(SIDE as f32 / 2.0, SIDE as f32 / 2.0, DEPTH_M);
+        let map_from_world = Affine3A::from_mat3_translation(scaled, middle - scaled * middle_m);
+        Area { sun_from_world, middle_m, map_from_world }
     }
 
     /// Whether a box (world frame) may throw a shadow onto the map.
@@ -75,14 +88,6 @@ impl Area {
         centre.length() < CASTERS_M + half.length()
             && meets(world_from_sun.x_axis)
             && meets(world_from_sun.y_axis)
-    }
-
-    /// Texels, and height towards the sun, m.
-    #[inline]
-    fn place_px(&self, place_m: Vec3) -> Vec3 {
-        let seen = self.sun_from_world * (place_m - self.middle_m);
-        let at = seen.truncate() / TEXEL_M + SIDE as f32 / 2.0;
-        at.extend(seen.z + DEPTH_M)
     }
 }
 
@@ -106,44 +111,62 @@ impl Shadows {
         self.map.clear();
         for tile in &surroundings.tiles {
             if area.may_be_shaded_by(tile.low_m, tile.high_m) {
-                self.draw_mesh(&tile.mesh, &|place_m| area.place_px(place_m));
+                self.draw_mesh(&tile.mesh, &area.map_from_world);
             }
         }
         for body in &instant.bodies {
             let centre_m = Vec3::from(body.world_from_body.translation);
             if area.may_be_shaded_by(centre_m - BODY_M, centre_m + BODY_M) {
-                let place_m = |place_m| body.world_from_body.transform_point3(place_m);
-                self.draw_mesh(&body.mesh, &|at_m| area.place_px(place_m(at_m)));
+                self.draw_mesh(&body.mesh, &(area.map_from_world * body.world_from_body));
             }
         }
     }
 
-    fn draw_mesh(&mut self, mesh: &Mesh, place_px: &dyn Fn(Vec3) -> Vec3) {
+    fn draw_mesh(&mut self, mesh: &Mesh, map_from_mesh: &Affine3A) {
+        let place_px = |vertex: &Vertex| map_from_mesh.transform_point3(vertex.position_m);
         self.places_px.clear();
-        self.places_px.extend(mesh.vertices.iter().map(|vertex| place_px(vertex.position_m)));
+        self.places_px.extend(mesh.vertices.iter().map(place_px));
+        self.bounds.clear();
+        self.bounds.extend(self.places_px.iter().map(|place| Bounds::at(place.truncate())));
         for triangle in mesh.triangles.iter().filter(|triangle| throws_shadow(triangle.material)) {
-            let corners = triangle.corners.map(|corner| self.places_px[corner as usize]);
-            self.map.draw_flat(corners);
+            let [a, b, c] = triangle.corners;
+            let (a, b, c) = (a as usize, b as usize, c as usize);
+            let (bounds, places_px) = (&self.bounds[..], &self.places_px[..]);
+            if Bounds::hold_a_centre(bounds[a], bounds[b], bounds[c], SIDE, SIDE) {
+                self.map.draw_flat([places_px[a], places_px[b], places_px[c]]);
+            }
         }
     }
 
-    /// Share of the sun's light that arrives at a place, world frame, m.
+    /// A place of the world frame, m, on the map: texels, and height towards the sun, m.
     #[inline]
-    pub fn sunlight(&self, place_m: Vec3A, normal: Vec3A) -> f32 {
-        let Some(area) = &self.area else { return 1.0 };
-        let place = area.place_px(Vec3::from(place_m + normal * 0.06));
-        let at = Vec2::new(place.x - 0.5, place.y - 0.5);
-        let (column, row) = (floor(at.x), floor(at.y));
+    pub fn place(&self, place_m: Vec3A) -> Vec3A {
+        self.area.map_or(Vec3A::ZERO, |area| area.map_from_world.transform_point3a(place_m))
+    }
+
+    /// How places on the map change with a way in the world, m.
+    #[inline]
+    pub fn change(&self, way_m: Vec3A) -> Vec3A {
+        self.area.map_or(Vec3A::ZERO, |area| area.map_from_world.transform_vector3a(way_m))
+    }
+
+    /// Share of the sun's light that arrives at a place on the map.
+    #[inline]
+    pub fn sunlight(&self, place: Vec3A) -> f32 {
+        if self.area.is_none() {
+            return 1.0;
+        }
+        let ((column, across), (row, up)) = (split(place.x - 0.5), split(place.y - 0.5));
         let inside = 0..SIDE as i32 - 1;
         if !inside.contains(&column) || !inside.contains(&row) {
             return 1.0;
         }
         let height_m = place.z + BIAS_M;
         let start = row as usize * SIDE + column as usize;
-        let open = |texel: usize| f32::from(u8::from(self.map.nearness[texel] < height_m));
-        let (across, up) = (at.x - column as f32, at.y - row as f32);
-        let below = open(start) + (open(start + 1) - open(start)) * across;
-        let above = open(start + SIDE) + (open(start + SIDE + 1) - open(start + SIDE)) * across;
+        let [near, far] = [start, start + SIDE].map(|start| &self.map.nearness[start..start + 2]);
+        let open = |nearness: f32| if nearness < height_m { 1.0 } else { 0.0 };
+        let [a, b, c, d] = [near[0], near[1], far[0], far[1]].map(open);
+        let (below, above) = (a + (b - a) * across, c + (d - c) * across);
         below + (above - below) * up
     }
 }

@@ -1,6 +1,6 @@
 //! Where the camera is, and what its view holds: the pinhole of [`projection::Camera`] in f32.
 
-use glam::{Affine3A, DAffine3, Mat3, Vec2, Vec3};
+use glam::{Affine3A, DAffine3, Mat3, Vec2, Vec3, Vec3A};
 
 use crate::projection;
 
@@ -24,6 +24,22 @@ pub struct View {
     pub world_from_camera: Mat3,
     /// Inward normals of the planes through the eye that bound the view, world frame.
     sides: [Vec3; 4],
+}
+
+/// Rays through the pixels of a row, from the eye to 1 m ahead; world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    pub number: usize,
+    /// Through the first pixel, and how rays change from pixel to pixel.
+    pub first: Vec3A,
+    pub across: Vec3A,
+}
+
+impl Row {
+    #[inline]
+    pub fn ray(&self, column: usize) -> Vec3A {
+        self.first + self.across * column as i32 as f32
+    }
 }
 
 impl View {
@@ -85,5 +101,12 @@ impl View {
     /// From the eye through a place on the picture to where it is 1 m ahead; world frame.
     pub fn ray(&self, place_px: Vec2) -> Vec3 {
         self.world_from_camera * ((place_px - self.centre_px) / self.focal_px).extend(1.0)
+    }
+
+    /// The rays of a row.
+    pub fn row(&self, number: usize) -> Row {
+        let first = self.ray(Vec2::new(0.5, number as f32 + 0.5)).into();
+        let across = (self.world_from_camera.x_axis / self.focal_px.x).into();
+        Row { number, first, across }
     }
 }

@@ -1,6 +1,8 @@
 //! Wet ground: a film that mirrors what stands behind it, smeared, and puddles that mirror it clearly.
 
-use glam::{Vec2, Vec3, Vec3A};
+use std::ops::Range;
+
+use glam::Vec3A;
 
 use crate::{
     scene::mesh::Material,
@@ -10,7 +12,7 @@ use crate::{
         grain::Grain,
         light::Light,
         raster::{NOTHING, Visibility},
-        view::View,
+        view::{Row, View},
     },
 };
 
@@ -19,6 +21,19 @@ const STEPS: usize = 6;
 
 /// A camera is level if its axes are within this of those of the world.
 const LEVEL: f32 = 0.03;
+
+/// Mirrored rays are followed for one in so many pixels of a row: the water is not smooth enough to
+/// tell.
+const KNOTS_PX: usize = 4;
+
+/// What changes slowly along a row.
+#[derive(Clone, Copy)]
+struct Knot {
+    /// Share of the light that is left by the way through the air; share that water mirrors at this
+    /// angle; breadth of the pixel on the ground, m.
+    water: Vec3A,
+    mirrored: Vec3A,
+}
 
 /// What the water on the ground does to a picture.
 pub struct Water<'a> {
@@ -40,24 +55,22 @@ impl Water<'_> {
         let axes = &view.world_from_camera;
         let is_level = axes.x_axis.z.abs() < LEVEL && axes.z_axis.z.abs() < LEVEL;
         for row in 0..view.height {
-            let start = row * view.width;
-            let first = view.ray(Vec2::new(0.5, row as f32 + 0.5));
-            let across = axes.x_axis / view.focal_px.x;
+            let row = view.row(row);
+            let start = row.number * view.width;
+            let facets = &self.visibility.facet[start..start + view.width];
             let mut known = (NOTHING, false);
-            let mut mirrored = None;
-            for column in 0..view.width {
-                let facet = self.visibility.facet[start + column];
+            let mut is_wet = |facet: u32| {
                 if facet != known.0 {
                     known = (facet, self.is_wet_ground(facet));
                 }
-                if known.1 {
-                    let ray = first + across * column as f32;
-                    // Neighbours mirror nearly the same: the water is not smooth enough to tell.
-                    let before = mirrored.filter(|_| column % 2 == 1);
-                    mirrored = self.mirror(row, column, ray, before, is_level, radiance);
-                } else {
-                    mirrored = None;
-                }
+                known.1
+            };
+            let mut from = 0;
+            while let Some(dry) = facets[from..].iter().position(|facet| is_wet(*facet)) {
+                from += dry;
+                let wet = facets[from..].iter().take_while(|facet| is_wet(**facet)).count();
+                self.mirror(&row, from..from + wet, is_level, radiance);
+                from += wet;
             }
         }
     }
@@ -73,50 +86,74 @@ impl Water<'_> {
         }
     }
 
-    /// Add what a pixel mirrors (`before`, if that is known), and return it.
-    #[inline]
-    fn mirror(
-        &self,
-        row: usize,
-        column: usize,
-        ray: Vec3,
-        before: Option<Vec3A>,
-        is_level: bool,
-        radiance: &mut [Vec3A],
-    ) -> Option<Vec3A> {
+    /// Add what the pixels of a run mirror.
+    fn mirror(&self, row: &Row, run: Range<usize>, is_level: bool, radiance: &mut [Vec3A]) {
+        let light = self.light;
+        let start = row.number * self.view.width;
+        let nearness = &self.visibility.nearness[start..];
+        let eye_m = Vec3A::from(self.view.eye_m);
+        let film = 0.42 * light.wetness;
+        let last = run.end - 1;
+        let mut from = run.start;
+        let mut here = self.knot(row, from, is_level, radiance);
+        loop {
+            let to = (from + KNOTS_PX).min(last);
+            let there = if to > from { self.knot(row, to, is_level, radiance) } else { here };
+            let per_pixel = 1.0 / (to - from).max(1) as f32;
+            // The last pixel of a run stands for itself.
+            for column in from..to.max(from + 1) {
+                let share = (column - from) as f32 * per_pixel;
+                let water = here.water.lerp(there.water, share);
+                let [left, fresnel, footprint_m] = water.to_array();
+                let at_m = eye_m + row.ray(column) / nearness[column];
+                let puddle = self.puddle(at_m, footprint_m);
+                let strength = fresnel * (film + (0.95 - film) * puddle);
+                if strength < 0.02 {
+                    continue;
+                }
+                let share_mirrored = strength * left;
+                let mirrored = here.mirrored.lerp(there.mirrored, share);
+                // Water that mirrors lets less light down to the ground.
+                let pixel = &mut radiance[start + column];
+                *pixel = *pixel * (1.0 - 0.6 * share_mirrored) + mirrored * share_mirrored;
+            }
+            if to == from {
+                return;
+            }
+            (from, here) = (to, there);
+        }
+    }
+
+    fn knot(&self, row: &Row, column: usize, is_level: bool, radiance: &[Vec3A]) -> Knot {
         let (view, light) = (self.view, self.light);
-        let place = row * view.width + column;
-        let nearness = self.visibility.nearness[place];
-        let from_eye_m = ray / nearness;
+        let nearness = self.visibility.nearness[row.number * view.width + column];
+        let from_eye_m = row.ray(column) / nearness;
         let distance_m = from_eye_m.length();
         let above_m = -from_eye_m.z;
         if above_m < 0.1 {
-            return None;
+            return Knot { water: Vec3A::ZERO, mirrored: light.horizon };
         }
         let facing = above_m / distance_m;
         let grazing = 1.0 - facing;
         let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing;
-        let at_m = view.eye_m + from_eye_m;
         let footprint_m = distance_m / (view.focal_px.x * facing.sqrt());
-        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2);
-        let edge = 0.45 - 0.35 * light.puddles;
-        let puddle = smooth(edge, edge + 0.25, pool) * light.puddles.sqrt();
-        let film = 0.42 * light.wetness;
-        let strength = fresnel * (film + (0.95 - film) * puddle);
-        if strength < 0.02 {
-            return None;
+        let rough = 1.0 - 0.85 * self.puddle(Vec3A::from(view.eye_m) + from_eye_m, footprint_m);
+        let met =
+            is_level.then(|| self.march(row.number, column, nearness, above_m, rough, radiance));
+        let sky = || light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing));
+        Knot {
+            water: Vec3A::new(fade(light.haze_per_m * distance_m), fresnel, footprint_m),
+            mirrored: met.flatten().unwrap_or_else(sky),
         }
-        let rough = 1.0 - 0.85 * puddle;
-        let mirrored = before.unwrap_or_else(|| {
-            let met = is_level.then(|| self.march(row, column, nearness, above_m, rough, radiance));
-            let sky = || light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing));
-            met.flatten().unwrap_or_else(sky)
-        });
-        let left = fade(light.haze_per_m * distance_m);
-        let share = strength * left;
-        // Water that mirrors lets less light down to the ground.
-        radiance[place] = radiance[place] * (1.0 - 0.6 * share) + mirrored * share;
-        Some(mirrored)
+    }
+
+    /// How much of a puddle there is at a place on the ground, world frame, in [0, 1].
+    #[inline]
+    fn puddle(&self, at_m: Vec3A, footprint_m: f32) -> f32 {
+        let puddles = self.light.puddles;
+        let pool = self.grain.at(at_m.x * 2.2, at_m.y * 2.2, footprint_m * 2.2);
+        let edge = 0.45 - 0.35 * puddles;
+        smooth(edge, edge + 0.25, pool) * puddles.sqrt()
     }
 
     /// Follow the mirrored ray up its column to what stands in its way.
