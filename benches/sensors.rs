@@ -9,7 +9,6 @@ use std::{
     time::{Duration, Instant as Clock},
 };
 
-use glam::{DAffine3, DVec3};
 use pmp::{
     noise::{Noise, Purpose},
     scene::{
@@ -90,7 +89,7 @@ fn sense(stage: &Stage, episode: &Episode) -> BTreeMap<&'static str, Duration> {
         lap("world");
         let (ego, ground_m) = (*drive.world.ego(), drive.world.ground_m());
         let instant = Instant::of(&drive.world.snapshot(), &shapes);
-        let pose = DAffine3::from_translation(DVec3::Z * ground_m) * ego.world_from_ego();
+        let pose = ego.world_from_ego(ground_m);
         camera.picture(&stage.surroundings, &instant, &pose, episode.sky, SEED);
         lap("camera");
         let place_m = pose.translation.as_vec3();

@@ -84,7 +84,7 @@ impl Gnss {
         let kept = (-elapsed_s / config.forgets_s).exp();
         let renewed = (1.0 - kept * kept).sqrt();
         self.offset_m = kept * self.offset_m + renewed * config.offset_std_m() * normal(noise);
-        let on_ground = DAffine3::from_translation(DVec3::Z * ground_m) * ego.world_from_ego();
+        let on_ground = ego.world_from_ego(ground_m);
         let antenna_m = on_ground.transform_point3(config.ego_from_antenna.translation);
         let noise_m = config.noise_std_m() * normal(noise);
         let [latitude_deg, longitude_deg, altitude_m] =

@@ -1,6 +1,6 @@
 //! The sensors of one drive, each with its own random numbers.
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use crate::{
     dataset::picture::{jpeg, rgb::Rgb},
@@ -93,7 +93,7 @@ impl<'t> Senses<'t> {
             Source::Camera => Reading::Picture(self.picture(drive)),
             Source::Lidar => {
                 let instant = Instant::of(&world.snapshot(), self.shapes);
-                let (config, pose) = (&self.rig.lidar, world_from_ego(ego, ground_m));
+                let (config, pose) = (&self.rig.lidar, ego.world_from_ego(ground_m));
                 let reach = self.reach(&instant, &pose, config.range_m);
                 Reading::Lidar(lidar::turn(config, &reach, &pose, self.sky, &mut self.lidar))
             }
@@ -137,7 +137,7 @@ impl<'t> Senses<'t> {
     fn picture(&mut self, drive: &Drive) -> Vec<u8> {
         let world = &drive.world;
         let instant = Instant::of(&world.snapshot(), self.shapes);
-        let pose = world_from_ego(world.ego(), world.ground_m());
+        let pose = world.ego().world_from_ego(world.ground_m());
         let (sky, seed) = (self.sky, self.camera_seed);
         let surroundings = &self.stage.surroundings;
         let data = self.camera.picture(surroundings, &instant, &pose, sky, seed).to_vec();
@@ -158,14 +158,9 @@ impl<'t> Senses<'t> {
     fn scan(&mut self, drive: &Drive) -> Vec<RadarReturn> {
         let (world, config) = (&drive.world, &self.rig.radar);
         let instant = Instant::of(&world.snapshot(), self.shapes);
-        let pose = world_from_ego(world.ego(), world.ground_m());
+        let pose = world.ego().world_from_ego(world.ground_m());
         let reach = self.reach(&instant, &pose, config.range_m);
         let radar_mps = config.velocity_world_mps(world.ego());
         radar::scan(config, &reach, &pose, radar_mps, self.sky, &mut self.radar)
     }
-}
-
-/// The ego frame, standing on the ground.
-fn world_from_ego(ego: &Car, ground_m: f64) -> DAffine3 {
-    DAffine3::from_translation(DVec3::Z * ground_m) * ego.world_from_ego()
 }

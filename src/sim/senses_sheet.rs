@@ -68,8 +68,7 @@ pub fn draw(town: Town, seed: u64) -> Result<Sheet> {
         rig: Rig::default(),
         stage: Stage::new(town),
         instant: Instant::of(&snapshot, &Shapes::new()),
-        world_from_ego: DAffine3::from_translation(DVec3::Z * snapshot.ego_ground_m)
-            * snapshot.ego.world_from_ego(),
+        world_from_ego: snapshot.ego.world_from_ego(snapshot.ego_ground_m),
         snapshot,
         seed,
     };

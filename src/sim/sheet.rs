@@ -6,7 +6,7 @@
 //! empty, few, regular, dense: clear day
 //! ```
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use crate::{
     error::Result,
@@ -83,9 +83,7 @@ pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
     let mut camera = Camera::new(config);
     let mut sheet = Sheet::blank(4 * across, 5 * down);
     let mut take = |snapshot: &Snapshot, sky: Sky, column: usize, row: usize| {
-        let ground_m = DVec3::Z * snapshot.ego_ground_m;
-        let mut world_from_ego = snapshot.ego.world_from_ego();
-        world_from_ego.translation += ground_m;
+        let world_from_ego = snapshot.ego.world_from_ego(snapshot.ego_ground_m);
         let instant = Instant::of(snapshot, &shapes);
         let picture = camera.picture(&surroundings, &instant, &world_from_ego, sky, seed);
         sheet.put(picture, width, [column * across, row * down]);

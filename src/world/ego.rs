@@ -205,8 +205,9 @@ impl Car {
         self.position_m - self.config.rear_axle_m() * DVec2::from_angle(self.yaw_rad)
     }
 
-    pub fn world_from_ego(&self) -> DAffine3 {
-        DAffine3::from_rotation_translation(self.orientation(), self.position_m.extend(0.0))
+    /// The ego frame in the world, on ground of a height, m.
+    pub fn world_from_ego(&self, ground_m: f64) -> DAffine3 {
+        DAffine3::from_rotation_translation(self.orientation(), self.position_m.extend(ground_m))
     }
 
     /// Of the ego frame in the world frame.

@@ -2,7 +2,7 @@
 //! lidar return, and ingest of the recorded log.
 #![allow(clippy::unwrap_used)]
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use pmp::{
     noise::{Noise, Purpose},
     projection::Nearest,
@@ -46,8 +46,7 @@ fn a_point_lands_on_one_pixel_by_renderer_projection_and_ingest() {
     for frame in frames.step_by(2).take(3) {
         let known = &known()[step_of(frame.stamp_ns)];
         let instant = Instant::of(&known.snapshot, &shapes);
-        let pose = DAffine3::from_translation(DVec3::Z * known.snapshot.ego_ground_m)
-            * known.car.world_from_ego();
+        let pose = known.car.world_from_ego(known.snapshot.ego_ground_m);
         camera.picture(&stage.surroundings, &instant, &pose, SKY, 0);
         let depths_m: Vec<f64> = camera.depths_m().map(f64::from).collect();
 

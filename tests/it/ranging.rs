@@ -326,10 +326,10 @@ fn a_radar_s_speed_is_the_change_of_the_distance() {
     let reach = Reach::new(&plain, &instant, ego.position_m.extend(0.0).as_vec3(), 100.0);
     let config = exact_radar();
     let radar_mps = config.velocity_world_mps(&ego);
-    let returns = scans(&reach, &ego.world_from_ego(), radar_mps, 60);
+    let returns = scans(&reach, &ego.world_from_ego(0.0), radar_mps, 60);
     let hold = Action { steer: ego.config.steer(0.12, 12.0) as f32, throttle: 0.2, brake: 0.0 };
     let later = ego.step(hold);
-    let [now, then] = [ego, later].map(|car| car.world_from_ego() * config.ego_from_radar);
+    let [now, then] = [ego, later].map(|car| car.world_from_ego(0.0) * config.ego_from_radar);
     let mut seen = [0; 4];
     for r in &returns {
         let beam = radar::direction(r.azimuth_rad, r.elevation_rad);

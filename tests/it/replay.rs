@@ -204,7 +204,7 @@ fn radar_speeds_in_log_and_frames_are_the_relative_radial_speeds_of_who_was_hit(
         let now = &known[*step];
         // Velocity of the radar by its place a step ago and now.
         let place = |known: &Known| {
-            let ego = known.car.world_from_ego() * rig.radar.ego_from_radar;
+            let ego = known.car.world_from_ego(0.0) * rig.radar.ego_from_radar;
             (ego, ego.translation)
         };
         let (world_from_radar, _): (DAffine3, _) = place(now);
