@@ -1,14 +1,14 @@
-//! AdamW whose state can be saved: moments by name, in name order.
+//! Adam and AdamW whose state can be saved: moments by name, in name order.
 //!
 //! candle's own hides its moments, so a resumed run would not be the run that was stopped.
 
 use std::collections::{BTreeMap, HashMap};
 
-use candle_core::{Tensor, Var, backprop::GradStore};
+use candle_core::{Tensor, Var};
 
 use crate::{
     error::{Error, Result},
-    model::init::Weights,
+    model::{gradient::Gradient, init::Weights},
 };
 
 /// Decay of the first and second moment, as everywhere (Kingma & Ba, 2015, arXiv:1412.6980).
@@ -18,9 +18,9 @@ const BETA: [f64; 2] = [0.9, 0.999];
 const EPS: f64 = 1e-8;
 
 /// AdamW (Loshchilov & Hutter, 2019, arXiv:1711.05101) as PyTorch has it, with clipping of the
-/// global norm.
+/// global norm; without decay it is Adam.
 #[derive(Debug)]
-pub struct AdamW {
+pub struct Adam {
     slots: Vec<Slot>,
     steps: u64,
     weight_decay: f64,
@@ -34,7 +34,7 @@ struct Slot {
     second: Tensor,
 }
 
-impl AdamW {
+impl Adam {
     /// No step taken, moments 0.
     ///
     /// # Errors
@@ -45,7 +45,11 @@ impl AdamW {
             let (first, second) = (var.zeros_like()?, var.zeros_like()?);
             Ok(Slot { name: name.into(), var: var.clone(), first, second })
         };
-        Ok(Self { slots: weights.iter().map(slot).collect::<Result<_>>()?, steps: 0, weight_decay })
+        Ok(Self {
+            slots: weights.parameters().map(slot).collect::<Result<_>>()?,
+            steps: 0,
+            weight_decay,
+        })
     }
 
     /// Steps taken.
@@ -54,30 +58,32 @@ impl AdamW {
     }
 
     /// Move the weights against the gradient, scaled down to `clip_norm` where its global L2 norm
-    /// is larger; returns the norm before that.
+    /// is larger and `clip_norm` is not 0; returns the norm before that. A parameter without a
+    /// gradient, on which the loss does not depend, stays as it is.
     ///
     /// # Errors
     ///
     /// [`Error::Diverged`] naming the first parameter whose gradient is not finite, before
-    /// anything is changed; [`Error::Tensor`] if a parameter has no gradient.
-    pub fn step(&mut self, grads: &GradStore, lr: f64, clip_norm: f64) -> Result<f64> {
-        let mut each = vec![];
+    /// anything is changed; [`Error::Tensor`] if memory runs out.
+    pub fn step(&mut self, gradient: &Gradient, lr: f64, clip_norm: f64) -> Result<f64> {
+        let mut squares = vec![];
         for slot in &self.slots {
-            let no = || candle_core::Error::msg(format!("no gradient for {}", slot.name));
-            each.push(grads.get(slot.var.as_tensor()).ok_or_else(no)?);
+            let Some(grad) = gradient.get(&slot.name) else { continue };
+            let square = f64::from(grad.sqr()?.sum_all()?.to_scalar::<f32>()?);
+            if !square.is_finite() {
+                let term = format!("gradient of {}", slot.name);
+                return Err(Error::Diverged { step: self.steps + 1, term, frames: vec![] });
+            }
+            squares.push(square);
         }
-        let squares = each.iter().map(|g| g.sqr()?.sum_all()).collect::<Result<Vec<_>, _>>()?;
-        let squares = Tensor::stack(&squares, 0)?.to_vec1::<f32>()?;
-        if let Some(broken) = squares.iter().position(|s| !s.is_finite()) {
-            let term = format!("gradient of {}", self.slots[broken].name);
-            return Err(Error::Diverged { step: self.steps + 1, term });
-        }
-        let norm = squares.iter().map(|s| f64::from(*s)).sum::<f64>().sqrt();
-        let scale = (clip_norm / (norm + 1e-6)).min(1.0);
+        let norm = squares.iter().sum::<f64>().sqrt();
+        let clipped = clip_norm > 0.0 && norm + 1e-6 > clip_norm;
+        let scale = if clipped { clip_norm / (norm + 1e-6) } else { 1.0 };
 
         self.steps += 1;
         let [bias1, bias2] = BETA.map(|b| 1.0 - b.powf(self.steps as f64));
-        for (slot, grad) in self.slots.iter_mut().zip(each) {
+        for slot in &mut self.slots {
+            let Some(grad) = gradient.get(&slot.name) else { continue };
             let grad = (grad.detach() * scale)?;
             slot.first = ((&slot.first * BETA[0])? + (&grad * (1.0 - BETA[0]))?)?;
             slot.second = ((&slot.second * BETA[1])? + (grad.sqr()? * (1.0 - BETA[1]))?)?;
