@@ -78,7 +78,7 @@ impl State {
             Optimizer::Adam => 0.0,
             Optimizer::Adamw => cfg.weight_decay,
         };
-        let adam = Adam::new(&weights, weight_decay)?;
+        let adam = Adam::new(&weights, weight_decay);
         let average = (cfg.ema > 0.0).then(|| Average::new(cfg.ema, &weights)).transpose()?;
         Ok(Self { net, weights, adam, average, progress: Progress::default() })
     }
@@ -107,7 +107,7 @@ impl State {
             step: self.adam.steps(),
             weights: self.weights.snapshot()?,
             average: self.average.as_ref().map(Average::values),
-            moments: self.adam.moments(),
+            moments: self.adam.moments()?,
             progress: self.progress.clone(),
         })
     }
