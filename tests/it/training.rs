@@ -45,6 +45,15 @@ impl Synthetic {
         Self { frames, salt: 0, size: [8, 16], dies_at: None, nan_at: None }
     }
 
+    pub(crate) fn of_size(frames: usize, size: [usize; 2]) -> Self {
+        Self { size, ..Self::new(frames) }
+    }
+
+    /// The same on a machine that is switched off at a step.
+    pub(crate) fn dying(frames: usize, at: u64) -> Self {
+        Self { dies_at: Some(at), ..Self::new(frames) }
+    }
+
     pub(crate) fn batch_of(&self, step: u64) -> Batch {
         let mut rng = ChaCha8Rng::seed_from_u64(self.salt ^ step);
         let b = self.frames;
@@ -131,7 +140,7 @@ pub(crate) fn small() -> TrainConfig {
     }
 }
 
-fn data(train: Synthetic) -> Data {
+pub(crate) fn data(train: Synthetic) -> Data {
     let validation = Synthetic { salt: 1 << 40, dies_at: None, nan_at: None, ..train.clone() };
     Data {
         train: Box::new(train),
@@ -141,7 +150,12 @@ fn data(train: Synthetic) -> Data {
     }
 }
 
-fn run_with(cfg: &TrainConfig, out: &Path, resume: bool, train: Synthetic) -> Result<Vec<Event>> {
+pub(crate) fn run_with(
+    cfg: &TrainConfig,
+    out: &Path,
+    resume: bool,
+    train: Synthetic,
+) -> Result<Vec<Event>> {
     let mut events = vec![];
     train_run(cfg, out, resume, &mut data(train), &Cpu, &mut |event| {
         events.push(event.clone());
@@ -155,7 +169,7 @@ pub(crate) fn run(cfg: &TrainConfig, out: &Path, resume: bool) -> Result<Vec<Eve
 }
 
 /// Every file of a directory, by path within it.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut out = BTreeMap::new();
     for entry in fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
@@ -170,7 +184,7 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
-fn assert_same_files(a: &Path, b: &Path) {
+pub(crate) fn assert_same_files(a: &Path, b: &Path) {
     let (a, b) = (files(a), files(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, bytes) in &a {
