@@ -62,6 +62,8 @@ mod run_schema;
 mod sampling;
 mod world;
 mod encoding;
+#[cfg(feature = "learning")]
+mod torch_networks;
 mod towns;
 mod scenery;
 mod scene;
