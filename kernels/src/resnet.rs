@@ -109,9 +109,10 @@ impl Normed {
 impl Network {
     /// In the order of use, of a block the shortcut last.
     pub fn layers(&self) -> Vec<Layer> {
-        let layer = |conv: String, norm: String, [channels, out_channels]: [usize; 2], kernel, stride| {
-            Layer { conv, norm, channels, out_channels, kernel, stride }
-        };
+        let layer =
+            |conv: String, norm: String, [channels, out_channels]: [usize; 2], kernel, stride| {
+                Layer { conv, norm, channels, out_channels, kernel, stride }
+            };
         let first = [self.channels, self.width];
         let mut layers = vec![layer("conv1".into(), "bn1".into(), first, 7, 2)];
         for (block, [c, o], stride) in self.blocks() {
@@ -229,13 +230,8 @@ pub fn forward(
     let mut features = vec![0.0; batch * network.features()];
     let last = outs.last().expect("the pooling's at least");
     pooling::mean(size[0] * size[1], network.features(), last, &mut features);
-    let tape = Tape {
-        batch: [batch, height, width],
-        of_batch,
-        layers: kept,
-        pool: (pool, which),
-        outs,
-    };
+    let tape =
+        Tape { batch: [batch, height, width], of_batch, layers: kept, pool: (pool, which), outs };
     (features, keep.then_some(tape))
 }
 
