@@ -65,8 +65,8 @@ pub enum Error {
     Picture { frame: u32, what: String },
 
     /// A training whose numbers are no numbers any more.
-    #[error("training diverged at step {step}: {term} is not finite")]
-    Diverged { step: u64, term: String },
+    #[error("training diverged at step {step}: {term} is not finite{}", listed(frames))]
+    Diverged { step: u64, term: String, frames: Vec<String> },
 
     /// A tensor operation failed: shapes, types or the device.
     #[cfg(feature = "learning")]
@@ -143,6 +143,16 @@ impl Error {
         }
     }
 
+    /// The same, of a training that worked on these frames.
+    pub fn of_frames(self, names: &[String]) -> Error {
+        match self {
+            Error::Diverged { step, term, .. } => {
+                Error::Diverged { step, term, frames: names.to_vec() }
+            }
+            other => other,
+        }
+    }
+
     /// What the person at the keyboard can do about it, where there is something to do.
     pub fn hint(&self) -> Option<String> {
         match self {
@@ -171,5 +181,18 @@ impl Error {
             ),
             _ => None,
         }
+    }
+}
+
+/// `; frames a/1, a/2 and 3 more`, or nothing.
+fn listed(frames: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let more = match frames.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    match frames {
+        [] => String::new(),
+        _ => format!("; frames {}{more}", frames[..SHOWN.min(frames.len())].join(", ")),
     }
 }

@@ -16,9 +16,9 @@ use crate::{
 /// What the network sees. `B` = batch.
 #[derive(Clone, Debug)]
 pub struct Inputs {
-    /// `[B, 3, H, W]` f32, RGB in 0 ... 1; `None` for a network without pictures.
+    /// `[B, H, W, 3]` f32, RGB in 0 ... 1; `None` for a network without pictures.
     pub camera: Option<Tensor>,
-    /// `[B, 4, H, W]` f32: x, y, z in metres (optical frame), relative speed in m/s; 0 = no return.
+    /// `[B, H, W, 4]` f32: x, y, z in metres (optical frame), relative speed in m/s; 0 = no return.
     pub ralidar: Option<Tensor>,
     /// `[B, 2]` f32, (vx, vy) m/s, ego frame.
     pub velocity: Tensor,
@@ -41,7 +41,7 @@ impl Inputs {
         let rows = || samples.iter().map(Borrow::borrow);
         let (mut camera, mut ralidar) = (None, None);
         if let Some(size) = rows().next().and_then(|s| s.size) {
-            let shape = |channels| (n, channels, size.height, size.width);
+            let shape = |channels| (n, size.height, size.width, channels);
             let rgb: Vec<u8> = rows().flat_map(|s| &s.camera).copied().collect();
             let rgb = Tensor::from_vec(rgb, shape(3), device)?.to_dtype(DType::F32)?;
             camera = Some((rgb / 255.0)?);
@@ -73,6 +73,8 @@ pub struct Targets {
     pub motion: Tensor,
     /// `[B, 30]` f32, 1 where `motion` is valid.
     pub motion_valid: Tensor,
+    /// `[B]` f32: the speed of now, m/s.
+    pub speed_mps: Tensor,
 }
 
 impl Targets {
@@ -83,6 +85,7 @@ impl Targets {
     /// [`Error::Tensor`](crate::error::Error::Tensor) if the device refuses.
     pub fn stack<S: Borrow<Sample>>(samples: &[S], device: &Device) -> Result<Self> {
         let n = samples.len();
+        let speed = |s: &S| s.borrow().velocity_mps[0].hypot(s.borrow().velocity_mps[1]);
         let mut motion = vec![0f32; n * FUTURE_STEPS * 2];
         let mut valid = vec![0f32; n * FUTURE_STEPS];
         let (mut action, mut known) = (vec![0f32; n * 3], vec![0f32; n * 3]);
@@ -103,6 +106,7 @@ impl Targets {
             action_known: Tensor::from_vec(known, (n, 3), device)?,
             motion: Tensor::from_vec(motion, (n, FUTURE_STEPS, 2), device)?,
             motion_valid: Tensor::from_vec(valid, (n, FUTURE_STEPS), device)?,
+            speed_mps: Tensor::from_vec(samples.iter().map(speed).collect(), n, device)?,
         })
     }
 }
@@ -112,15 +116,68 @@ impl Targets {
 pub struct Batch {
     pub inputs: Inputs,
     pub targets: Targets,
+    /// Where each frame comes from, `episode/frame`, to name those that broke a training.
+    pub frames: Vec<String>,
 }
 
 impl Batch {
-    /// Samples as one batch on a device; errors as [`Inputs::stack`] and [`Targets::stack`].
-    pub fn stack<S: Borrow<Sample>>(samples: &[S], device: &Device) -> Result<Self> {
+    /// Samples with their names as one batch on a device; errors as [`Inputs::stack`] and
+    /// [`Targets::stack`].
+    pub fn stack<S: Borrow<Sample>>(
+        samples: &[S],
+        frames: Vec<String>,
+        device: &Device,
+    ) -> Result<Self> {
         Ok(Self {
             inputs: Inputs::stack(samples, device)?,
             targets: Targets::stack(samples, device)?,
+            frames,
         })
+    }
+
+    /// Frames in it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Tensor`](crate::error::Error::Tensor) if the velocities are no `[B, 2]`.
+    pub fn len(&self) -> Result<usize> {
+        Ok(self.inputs.velocity.dim(0)?)
+    }
+
+    /// The batch cut into at most `parts` of nearly the same size, in order.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Tensor`](crate::error::Error::Tensor) if the tensors do not have the same first
+    /// dimension.
+    pub fn split(&self, parts: usize) -> Result<Vec<Batch>> {
+        let frames = self.len()?;
+        let size = frames.div_ceil(parts).max(1);
+        let cut = |start: usize| {
+            let count = size.min(frames - start);
+            let rows = |t: &Tensor| t.narrow(0, start, count);
+            let (inputs, targets) = (&self.inputs, &self.targets);
+            let names = self.frames.iter().skip(start).take(count);
+            Ok(Batch {
+                inputs: Inputs {
+                    camera: inputs.camera.as_ref().map(rows).transpose()?,
+                    ralidar: inputs.ralidar.as_ref().map(rows).transpose()?,
+                    velocity: rows(&inputs.velocity)?,
+                    route: rows(&inputs.route)?,
+                    command: rows(&inputs.command)?,
+                    present: rows(&inputs.present)?,
+                },
+                targets: Targets {
+                    action: rows(&targets.action)?,
+                    action_known: rows(&targets.action_known)?,
+                    motion: rows(&targets.motion)?,
+                    motion_valid: rows(&targets.motion_valid)?,
+                    speed_mps: rows(&targets.speed_mps)?,
+                },
+                frames: names.cloned().collect(),
+            })
+        };
+        (0..frames).step_by(size).map(cut).collect()
     }
 }
 

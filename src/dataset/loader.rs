@@ -35,13 +35,16 @@ const AHEAD: usize = 4;
 /// Frames in a validation batch.
 pub const VALIDATION_BATCH: usize = 64;
 
+/// `episode/frame`, and what is there.
+type Named = (String, Sample);
+
 /// Row groups of one side, as samples, as many as fit the memory.
 struct Groups {
     dataset: Arc<Dataset>,
     groups: Vec<GroupRows>,
     size: Option<InputSize>,
     /// Samples by group, with the time of their last use.
-    cache: BTreeMap<u32, (u64, Arc<Vec<Sample>>)>,
+    cache: BTreeMap<u32, (u64, Arc<Vec<Named>>)>,
     cache_groups: usize,
     uses: u64,
 }
@@ -58,7 +61,7 @@ impl Groups {
         Groups { dataset, groups, size, cache: BTreeMap::new(), cache_groups, uses: 0 }
     }
 
-    fn samples(&mut self, group: u32) -> Result<Arc<Vec<Sample>>> {
+    fn samples(&mut self, group: u32) -> Result<Arc<Vec<Named>>> {
         self.uses += 1;
         if let Some((last_use, samples)) = self.cache.get_mut(&group) {
             *last_use = self.uses;
@@ -66,12 +69,12 @@ impl Groups {
         }
         let rows = &self.groups[group as usize];
         let frames = self.dataset.group(rows)?;
-        let sample = |(row, (_, frame)): (&Row, &(String, Frame))| {
+        let sample = |(row, (episode, frame)): (&Row, &(String, Frame))| {
             let mut sample = Sample::new(frame, self.size)?;
             sample.motion_len = sample.motion_len.min(usize::from(row.undisturbed_steps));
-            Ok(sample)
+            Ok((format!("{episode}/{}", frame.index), sample))
         };
-        let samples: Vec<Sample> =
+        let samples: Vec<Named> =
             rows.rows.par_iter().zip(&frames).map(sample).collect::<Result<_>>()?;
         if self.cache.len() >= self.cache_groups {
             let oldest = self.cache.iter().min_by_key(|(_, (last_use, _))| *last_use);
@@ -85,15 +88,16 @@ impl Groups {
     }
 
     fn batch(&mut self, positions: &[Position], device: &Device) -> Result<Batch> {
-        let mut groups: BTreeMap<u32, Arc<Vec<Sample>>> = BTreeMap::new();
+        let mut groups: BTreeMap<u32, Arc<Vec<Named>>> = BTreeMap::new();
         for (group, _) in positions {
             if !groups.contains_key(group) {
                 groups.insert(*group, self.samples(*group)?);
             }
         }
-        let samples: Vec<&Sample> =
-            positions.iter().map(|(group, row)| &groups[group][*row as usize]).collect();
-        Batch::stack(&samples, device)
+        let at = |(group, row): &Position| &groups[group][*row as usize];
+        let samples: Vec<&Sample> = positions.iter().map(|p| &at(p).1).collect();
+        let names = positions.iter().map(|p| at(p).0.clone()).collect();
+        Batch::stack(&samples, names, device)
     }
 }
 

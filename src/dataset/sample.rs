@@ -28,9 +28,9 @@ pub struct InputSize {
 pub struct Sample {
     /// Of both pictures; `None` for a network without pictures.
     pub size: Option<InputSize>,
-    /// `[3, H, W]` RGB, 0 ... 255; empty without a size.
+    /// `[H, W, 3]` RGB, 0 ... 255; empty without a size.
     pub camera: Vec<u8>,
-    /// `[4, H, W]`: x, y, z in metres (optical frame), relative speed in m/s, 0 = no return; empty
+    /// `[H, W, 4]`: x, y, z in metres (optical frame), relative speed in m/s, 0 = no return; empty
     /// without a size.
     pub ralidar: Vec<f16>,
     /// Which sensors delivered: camera, ralidar.
@@ -73,7 +73,7 @@ impl Sample {
             } else {
                 let stored = jpeg::decode(&frame.image).map_err(wrong)?;
                 let shrunk = scale::resize(&stored, Area::whole(&stored), size.width, size.height);
-                camera = planes(&shrunk.map_err(wrong)?.data);
+                camera = shrunk.map_err(wrong)?.into_owned().data;
                 InputSize { height: stored.height, width: stored.width }
             };
             ralidar = scatter(frame, stored, size).map_err(wrong)?;
@@ -94,12 +94,7 @@ impl Sample {
     }
 }
 
-/// RGB, RGB, ... to all R, all G, all B.
-fn planes(rgb: &[u8]) -> Vec<u8> {
-    (0..3).flat_map(|channel| rgb.iter().skip(channel).step_by(3).copied()).collect()
-}
-
-/// Lidar and radar returns of the stored picture on the pixels of the shrunk one: `[4, H, W]`.
+/// Lidar and radar returns of the stored picture on the pixels of the shrunk one: `[H, W, 4]`.
 fn scatter(frame: &Frame, from: InputSize, to: InputSize) -> Result<Vec<f16>, String> {
     let area = to.height * to.width;
     let mut out = vec![f16::ZERO; 4 * area];
@@ -118,7 +113,7 @@ fn scatter(frame: &Frame, from: InputSize, to: InputSize) -> Result<Vec<f16>, St
             let at = target(pixel, "lidar")?;
             if z < nearest[at] {
                 nearest[at] = z;
-                (out[at], out[area + at], out[2 * area + at]) = (x, y, z);
+                out[4 * at..4 * at + 3].copy_from_slice(&[x, y, z]);
             }
         }
     }
@@ -127,7 +122,7 @@ fn scatter(frame: &Frame, from: InputSize, to: InputSize) -> Result<Vec<f16>, St
         && let Some(speeds) = &radar.speed_mps
     {
         for (&pixel, &speed) in radar.pixel.iter().zip(speeds) {
-            let at = 3 * area + target(pixel, "radar")?;
+            let at = 4 * target(pixel, "radar")? + 3;
             if speed.to_f32().abs() > out[at].to_f32().abs() {
                 out[at] = speed;
             }

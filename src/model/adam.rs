@@ -1,26 +1,24 @@
-//! AdamW whose state can be saved: moments by name, in name order.
+//! Adam and AdamW whose state can be saved: moments by name, in name order.
 //!
 //! candle's own hides its moments, so a resumed run would not be the run that was stopped.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, HashMap},
+};
 
-use candle_core::{Tensor, Var, backprop::GradStore};
+use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Storage, Tensor, Var};
+use pmp_kernels::adam::{Step, sum_of_squares};
 
 use crate::{
     error::{Error, Result},
-    model::init::Weights,
+    model::{gradient::Gradient, init::Weights},
 };
 
-/// Decay of the first and second moment, as everywhere (Kingma & Ba, 2015, arXiv:1412.6980).
-const BETA: [f64; 2] = [0.9, 0.999];
-
-/// Added to the root of the second moment, as everywhere.
-const EPS: f64 = 1e-8;
-
 /// AdamW (Loshchilov & Hutter, 2019, arXiv:1711.05101) as PyTorch has it, with clipping of the
-/// global norm.
+/// global norm; without decay it is Adam.
 #[derive(Debug)]
-pub struct AdamW {
+pub struct Adam {
     slots: Vec<Slot>,
     steps: u64,
     weight_decay: f64,
@@ -30,22 +28,18 @@ pub struct AdamW {
 struct Slot {
     name: String,
     var: Var,
-    first: Tensor,
-    second: Tensor,
+    first: Vec<f32>,
+    second: Vec<f32>,
 }
 
-impl AdamW {
+impl Adam {
     /// No step taken, moments 0.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Tensor`] if memory runs out.
-    pub fn new(weights: &Weights, weight_decay: f64) -> Result<Self> {
+    pub fn new(weights: &Weights, weight_decay: f64) -> Self {
         let slot = |(name, var): (&str, &Var)| {
-            let (first, second) = (var.zeros_like()?, var.zeros_like()?);
-            Ok(Slot { name: name.into(), var: var.clone(), first, second })
+            let zeros = || vec![0.0; var.elem_count()];
+            Slot { name: name.into(), var: var.clone(), first: zeros(), second: zeros() }
         };
-        Ok(Self { slots: weights.iter().map(slot).collect::<Result<_>>()?, steps: 0, weight_decay })
+        Self { slots: weights.parameters().map(slot).collect(), steps: 0, weight_decay }
     }
 
     /// Steps taken.
@@ -54,47 +48,54 @@ impl AdamW {
     }
 
     /// Move the weights against the gradient, scaled down to `clip_norm` where its global L2 norm
-    /// is larger; returns the norm before that.
+    /// is larger and `clip_norm` is not 0; returns the norm before that. A parameter without a
+    /// gradient, on which the loss does not depend, stays as it is.
     ///
     /// # Errors
     ///
     /// [`Error::Diverged`] naming the first parameter whose gradient is not finite, before
-    /// anything is changed; [`Error::Tensor`] if a parameter has no gradient.
-    pub fn step(&mut self, grads: &GradStore, lr: f64, clip_norm: f64) -> Result<f64> {
-        let mut each = vec![];
+    /// anything is changed; [`Error::Tensor`] if memory runs out.
+    pub fn step(&mut self, gradient: &Gradient, lr: f64, clip_norm: f64) -> Result<f64> {
+        let mut squares = 0.0;
         for slot in &self.slots {
-            let no = || candle_core::Error::msg(format!("no gradient for {}", slot.name));
-            each.push(grads.get(slot.var.as_tensor()).ok_or_else(no)?);
+            let Some(grad) = gradient.get(&slot.name) else { continue };
+            let its = sum_over(grad)?;
+            if !its.is_finite() {
+                let term = format!("gradient of {}", slot.name);
+                return Err(Error::Diverged { step: self.steps + 1, term, frames: vec![] });
+            }
+            squares += its;
         }
-        let squares = each.iter().map(|g| g.sqr()?.sum_all()).collect::<Result<Vec<_>, _>>()?;
-        let squares = Tensor::stack(&squares, 0)?.to_vec1::<f32>()?;
-        if let Some(broken) = squares.iter().position(|s| !s.is_finite()) {
-            let term = format!("gradient of {}", self.slots[broken].name);
-            return Err(Error::Diverged { step: self.steps + 1, term });
-        }
-        let norm = squares.iter().map(|s| f64::from(*s)).sum::<f64>().sqrt();
-        let scale = (clip_norm / (norm + 1e-6)).min(1.0);
+        let norm = squares.sqrt();
+        let clipped = clip_norm > 0.0 && norm + 1e-6 > clip_norm;
+        let grad_scale = if clipped { clip_norm / (norm + 1e-6) } else { 1.0 };
 
         self.steps += 1;
-        let [bias1, bias2] = BETA.map(|b| 1.0 - b.powf(self.steps as f64));
-        for (slot, grad) in self.slots.iter_mut().zip(each) {
-            let grad = (grad.detach() * scale)?;
-            slot.first = ((&slot.first * BETA[0])? + (&grad * (1.0 - BETA[0]))?)?;
-            slot.second = ((&slot.second * BETA[1])? + (grad.sqr()? * (1.0 - BETA[1]))?)?;
-            let size = ((slot.second.sqrt()? * (1.0 / bias2.sqrt()))? + EPS)?;
-            let kept = (slot.var.as_detached_tensor() * (1.0 - lr * self.weight_decay))?;
-            slot.var.set(&(kept - ((&slot.first / size)? * (lr / bias1))?)?)?;
+        let (number, weight_decay) = (self.steps, self.weight_decay);
+        let step =
+            Step { number, lr, weight_decay, decoupled: true, grad_scale, ..Step::default() };
+        for slot in &mut self.slots {
+            let Some(grad) = gradient.get(&slot.name) else { continue };
+            let moments = RefCell::new((&mut slot.first[..], &mut slot.second[..]));
+            slot.var.inplace_op2(&grad.contiguous()?, &Move { step, moments })?;
         }
         Ok(norm)
     }
 
     /// Both moments: `first.NAME` and `second.NAME`.
-    pub fn moments(&self) -> BTreeMap<String, Tensor> {
-        let both = |slot: &Slot| {
-            let first = (format!("first.{}", slot.name), slot.first.clone());
-            [first, (format!("second.{}", slot.name), slot.second.clone())]
-        };
-        self.slots.iter().flat_map(both).collect()
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Tensor`] if memory runs out.
+    pub fn moments(&self) -> Result<BTreeMap<String, Tensor>> {
+        let mut moments = BTreeMap::new();
+        for slot in &self.slots {
+            for (which, values) in [("first", &slot.first), ("second", &slot.second)] {
+                let tensor = Tensor::from_slice(values, slot.var.shape(), &Device::Cpu)?;
+                moments.insert(format!("{which}.{}", slot.name), tensor);
+            }
+        }
+        Ok(moments)
     }
 
     /// Continue after `steps` steps with their moments.
@@ -107,7 +108,7 @@ impl AdamW {
             let moment = |which: &str| {
                 let name = format!("{which}.{}", slot.name);
                 match moments.get(&name) {
-                    Some(m) if m.dims() == slot.var.dims() => Ok(m.clone()),
+                    Some(m) if m.dims() == slot.var.dims() => m.flatten_all()?.to_vec1::<f32>(),
                     _ => Err(candle_core::Error::msg(format!("no moment {name} that fits"))),
                 }
             };
@@ -115,5 +116,49 @@ impl AdamW {
         }
         self.steps = steps;
         Ok(())
+    }
+}
+
+/// One parameter's share of a step, in place.
+struct Move<'m> {
+    step: Step,
+    /// First and second; candle hands out a shared reference to the operation.
+    moments: RefCell<(&'m mut [f32], &'m mut [f32])>,
+}
+
+impl InplaceOp2 for Move<'_> {
+    fn name(&self) -> &'static str {
+        "adam"
+    }
+
+    fn cpu_fwd(
+        &self,
+        weights: &mut CpuStorage,
+        at: &Layout,
+        grad: &CpuStorage,
+        grad_at: &Layout,
+    ) -> candle_core::Result<()> {
+        let (Some(at), Some(grad_at)) = (at.contiguous_offsets(), grad_at.contiguous_offsets())
+        else {
+            candle_core::bail!("adam: weights and gradients have to be contiguous")
+        };
+        let (CpuStorage::F32(weights), CpuStorage::F32(grad)) = (weights, grad) else {
+            candle_core::bail!("adam: weights and gradients have to be f32")
+        };
+        let (first, second) = &mut *self.moments.borrow_mut();
+        self.step.take(&mut weights[at.0..at.1], &grad[grad_at.0..grad_at.1], first, second);
+        Ok(())
+    }
+}
+
+/// The sum of the squares of a gradient on the CPU.
+fn sum_over(grad: &Tensor) -> Result<f64> {
+    let grad = grad.contiguous()?;
+    let (storage, layout) = grad.storage_and_layout();
+    match (&*storage, layout.contiguous_offsets()) {
+        (Storage::Cpu(CpuStorage::F32(numbers)), Some((from, to))) => {
+            Ok(sum_of_squares(&numbers[from..to]))
+        }
+        _ => Err(candle_core::Error::msg("adam: gradients have to be f32 on the CPU").into()),
     }
 }

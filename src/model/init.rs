@@ -29,7 +29,7 @@ pub fn kaiming(after: NonLinearity) -> Init {
     }
 }
 
-/// The trainable parameters of a network, by name.
+/// The weights of a network by name: what is trained, and the running statistics of batch norms.
 #[derive(Clone, Debug)]
 pub struct Weights(BTreeMap<String, Var>);
 
@@ -54,14 +54,19 @@ impl Weights {
         Ok((Self(made), built?))
     }
 
-    /// In name order.
+    /// All, in name order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Var)> {
         self.0.iter().map(|(name, var)| (name.as_str(), var))
     }
 
-    /// How many numbers there are.
+    /// Those that a gradient moves, in name order.
+    pub fn parameters(&self) -> impl Iterator<Item = (&str, &Var)> {
+        self.iter().filter(|(name, _)| !is_statistic(name))
+    }
+
+    /// How many numbers a gradient moves.
     pub fn count(&self) -> usize {
-        self.0.values().map(|var| var.elem_count()).sum()
+        self.parameters().map(|(_, var)| var.elem_count()).sum()
     }
 
     /// The values of now, without a graph and not sharing memory with what is trained on.
@@ -93,6 +98,12 @@ impl Weights {
             None => Ok(()),
         }
     }
+}
+
+/// Whether a weight is a running statistic of a batch norm, by torchvision's name.
+fn is_statistic(name: &str) -> bool {
+    let last = name.rsplit('.').next();
+    matches!(last, Some("running_mean" | "running_var"))
 }
 
 /// Makes each parameter when the network first asks for it.

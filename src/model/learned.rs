@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use candle_core::{DType, Device, Tensor};
-use candle_nn::{VarBuilder, ops::softmax};
+use candle_nn::VarBuilder;
 
 use crate::{
     dataset::{
@@ -13,7 +13,10 @@ use crate::{
     error::{Error, Result},
     frame::{FUTURE_STEPS, Frame},
     model::{
-        pmp::{MOTION_SPEED_UNIT_MPS, Mixture, Output, Pmp},
+        mixture::{MOTION_SPEED_UNIT_MPS, Mixture},
+        network::Network,
+        output::Output,
+        pass::Pass,
         run,
     },
     policy::{Action, Mode, ModeStd, Plan, Policy},
@@ -23,7 +26,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Learned {
     name: String,
-    net: Pmp,
+    net: Network,
     size: Option<InputSize>,
     device: Device,
 }
@@ -37,7 +40,7 @@ impl Learned {
     pub fn open(dir: &Path, device: &Device) -> Result<Self> {
         let (config, weights) = run::trained(dir, device)?;
         let vb = VarBuilder::from_tensors(weights, DType::F32, device);
-        let net = Pmp::new(&config.net, vb).map_err(|e| Error::Run {
+        let net = Network::new(&config.net, vb).map_err(|e| Error::Run {
             path: dir.into(),
             what: format!("the weights are not those of the configuration ({e})"),
             hint: None,
@@ -53,7 +56,7 @@ impl Learned {
     /// [`Error::Picture`] if the frame's picture cannot be used, [`Error::Tensor`].
     pub fn output(&self, frame: &Frame) -> Result<Output> {
         let sample = Sample::new(frame, self.size)?;
-        self.net.forward(&Inputs::stack(&[&sample], &self.device)?)
+        self.net.forward(&Inputs::stack(&[&sample], &self.device)?, &Pass::Judge)
     }
 
     /// Names of [`Output::attention`].
@@ -73,13 +76,15 @@ impl Policy for Learned {
         let output = self.output(frame)?;
         let action = output.action.flatten_all()?.to_vec1::<f32>()?;
         let action = Action { steer: action[0], throttle: action[1], brake: action[2] };
-        Ok(Plan { action: Some(action), motion: modes(&output.motion)? })
+        let motion = output.motion.as_ref().map(modes).transpose()?.unwrap_or_default();
+        Ok(Plan { action: Some(action), motion })
     }
 }
 
-/// The modes of the first mixture of a batch, in m/s and rad.
+/// The modes of the first mixture of a batch, in m/s and rad. Of mixtures at each step, a mode's
+/// weight is the mean of its weights over the steps.
 fn modes(mixture: &Mixture) -> Result<Vec<Mode>> {
-    let weights = softmax(&mixture.logits.get(0)?, 0)?.to_vec1::<f32>()?;
+    let weights = mixture.log_weights()?.get(0)?.exp()?.mean(1)?.to_vec1::<f32>()?;
     let means = steps(&mixture.mean.get(0)?)?;
     let stds = steps(&mixture.log_std.get(0)?.exp()?)?;
     let mode = |((weight, mean), std): ((f32, Steps), Steps)| Mode {

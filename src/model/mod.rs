@@ -10,12 +10,31 @@
 //! Everything is a function of (configuration, data, step): a training that was stopped at any
 //! moment and resumed ends with the weights, the moments and the curves of one that was not.
 
+pub mod net_config;
 pub mod config;
 pub mod init;
-pub mod conv;
+pub mod pass;
+pub mod ops;
+pub mod batch_norm;
+pub mod resnet;
+pub mod describe;
+pub mod dense;
+pub mod encoder;
+pub mod mixture;
+pub mod output;
 pub mod pmp;
+pub mod cil;
+pub mod int;
+pub mod network;
 pub mod loss;
+pub mod metrics;
+pub mod gradient;
 pub mod adam;
+pub mod average;
+pub mod pretrained;
+pub mod curves;
+pub mod events;
 pub mod run;
 pub mod train;
+pub mod sweep;
 pub mod learned;

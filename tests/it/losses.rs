@@ -4,10 +4,12 @@ use candle_core::{DType, Device::Cpu, Tensor, Var};
 use pmp::{
     error::{Error, Result},
     model::{
-        adam::AdamW,
+        adam::Adam,
+        config::Assign,
+        gradient::Gradient,
         init::{Weights, kaiming},
         loss::{action_l1, motion_nll},
-        pmp::Mixture,
+        mixture::Mixture,
     },
 };
 
@@ -52,6 +54,7 @@ pub(crate) fn check_gradient(var: &Var, loss: &dyn Fn() -> Tensor, which: &[usiz
 }
 
 struct Case {
+    /// Of manoeuvres `[B, K, 1]`, or of a mixture at each step `[B, K, 30]`.
     logits: Var,
     mean: Var,
     log_std: Var,
@@ -63,8 +66,8 @@ const B: usize = 4;
 const K: usize = 3;
 
 impl Case {
-    /// Samples with 30, 7, 1 and 0 valid steps.
-    fn new() -> Self {
+    /// Samples with 30, 7, 1 and 0 valid steps, `weights` a mode.
+    fn new(weights: usize) -> Self {
         let wide = |salt| noise(B * K * 60, salt);
         let target: Vec<f64> = noise(B * 60, 4).iter().map(|x| x * 6.0).collect();
         let valid: Vec<f64> = [30, 7, 1, 0]
@@ -72,7 +75,7 @@ impl Case {
             .flat_map(|n| (0..30).map(|t| f64::from(u8::from(t < *n))))
             .collect();
         Self {
-            logits: var(noise(B * K, 1), &[B, K]),
+            logits: var(noise(B * K * weights, 1), &[B, K, weights]),
             mean: var(wide(2), &[B, K, 30, 2]),
             log_std: var(wide(3), &[B, K, 30, 2]),
             target: Tensor::from_vec(target, (B, 30, 2), &Cpu).unwrap(),
@@ -80,88 +83,123 @@ impl Case {
         }
     }
 
-    fn loss(&self) -> Tensor {
-        let mixture = Mixture {
+    fn mixture(&self) -> Mixture {
+        Mixture {
             logits: self.logits.as_tensor().clone(),
             mean: self.mean.as_tensor().clone(),
             log_std: self.log_std.as_tensor().clone(),
-        };
-        motion_nll(&mixture, &self.target, &self.valid).unwrap()
+        }
+    }
+
+    fn loss(&self, assign: Assign) -> Tensor {
+        motion_nll(&self.mixture(), &self.target, &self.valid, assign).unwrap()
     }
 
     /// The definition, number by number, without any trick.
-    fn slow(&self) -> f64 {
+    fn slow(&self, assign: Assign) -> f64 {
         let flat = |t: &Tensor| t.flatten_all().unwrap().to_vec1::<f64>().unwrap();
         let (logits, mean, log_std) = (flat(&self.logits), flat(&self.mean), flat(&self.log_std));
         let (target, valid) = (flat(&self.target), flat(&self.valid));
+        let weights = logits.len() / (B * K);
+        let weight = |b: usize, k: usize, s: usize| {
+            let all: f64 = (0..K).map(|k| logits[(b * K + k) * weights + s].exp()).sum();
+            logits[(b * K + k) * weights + s].exp() / all
+        };
+        // Likelihood of the numbers of some steps in a mode, and how far they are from its means.
+        let of_steps = |b: usize, k: usize, steps: &[usize]| {
+            let (mut density, mut distance) = (1.0, 0.0);
+            for (&t, d) in steps.iter().flat_map(|t| [(t, 0), (t, 1)]) {
+                let at = ((b * K + k) * 30 + t) * 2 + d;
+                let (x, std) = (target[(b * 30 + t) * 2 + d], log_std[at].exp());
+                let off = x / [10.0, 1.0][d] - mean[at];
+                density *=
+                    (-(off / std).powi(2) / 2.0).exp() / (std * std::f64::consts::TAU.sqrt());
+                distance += off * off;
+            }
+            (density, distance)
+        };
+        let likelihood = |b: usize, steps: &[usize], s: usize| -> f64 {
+            let modes = (0..K).map(|k| (weight(b, k, s), of_steps(b, k, steps)));
+            match assign {
+                Assign::Soft => modes.map(|(weight, (density, _))| weight * density).sum(),
+                Assign::Nearest => {
+                    let nearest = modes.min_by(|a, b| a.1.1.total_cmp(&b.1.1)).unwrap();
+                    nearest.0 * nearest.1.0
+                }
+            }
+        };
         let (mut sum, mut samples) = (0.0, 0.0);
         for b in 0..B {
-            let all: f64 = (0..K).map(|k| logits[b * K + k].exp()).sum();
-            let (mut likelihood, mut numbers) = (0.0, 0.0);
-            for k in 0..K {
-                let mut density = logits[b * K + k].exp() / all;
-                numbers = 0.0;
-                for t in (0..30).filter(|t| valid[b * 30 + t] == 1.0) {
-                    for d in 0..2 {
-                        let at = ((b * K + k) * 30 + t) * 2 + d;
-                        let (x, std) = (target[(b * 30 + t) * 2 + d], log_std[at].exp());
-                        let z = (x / [10.0, 1.0][d] - mean[at]) / std;
-                        density *= (-z * z / 2.0).exp() / (std * std::f64::consts::TAU.sqrt());
-                        numbers += 1.0;
-                    }
-                }
-                likelihood += density;
+            let steps: Vec<usize> = (0..30).filter(|t| valid[b * 30 + t] == 1.0).collect();
+            if steps.is_empty() {
+                continue;
             }
-            if numbers > 0.0 {
-                sum -= likelihood.ln() / numbers;
-                samples += 1.0;
-            }
+            let log_likelihood: f64 = match weights {
+                1 => likelihood(b, &steps, 0).ln(),
+                _ => steps.iter().map(|&t| likelihood(b, &[t], t).ln()).sum(),
+            };
+            sum -= log_likelihood / (2 * steps.len()) as f64;
+            samples += 1.0;
         }
         sum / samples
     }
 }
 
+/// Manoeuvres and mixtures at each step, soft and nearest.
+fn every_kind() -> impl Iterator<Item = (Case, Assign)> {
+    let kinds =
+        [(1, Assign::Soft), (1, Assign::Nearest), (30, Assign::Soft), (30, Assign::Nearest)];
+    kinds.into_iter().map(|(weights, assign)| (Case::new(weights), assign))
+}
+
 #[test]
 fn motion_nll_is_the_definition_evaluated_number_by_number() {
-    let case = Case::new();
-    let (fast, slow) = (scalar(&case.loss()), case.slow());
-    assert!((fast - slow).abs() < 1e-12 * slow.abs(), "{fast} {slow}");
+    for (case, assign) in every_kind() {
+        let (fast, slow) = (scalar(&case.loss(assign)), case.slow(assign));
+        assert!((fast - slow).abs() < 1e-12 * slow.abs(), "{assign:?}: {fast} {slow}");
+    }
 }
 
 #[test]
 fn motion_nll_has_the_gradient_of_finite_differences() {
-    let case = Case::new();
-    let loss = || case.loss();
-    check_gradient(&case.logits, &loss, &(0..B * K).collect::<Vec<_>>());
-    let some: Vec<_> = (0..B * K * 60).step_by(17).collect();
-    check_gradient(&case.mean, &loss, &some);
-    check_gradient(&case.log_std, &loss, &some);
+    for (case, assign) in every_kind() {
+        let loss = || case.loss(assign);
+        let weights = case.logits.elem_count();
+        check_gradient(
+            &case.logits,
+            &loss,
+            &(0..weights).step_by(weights / 12).collect::<Vec<_>>(),
+        );
+        let some: Vec<_> = (0..B * K * 60).step_by(17).collect();
+        check_gradient(&case.mean, &loss, &some);
+        check_gradient(&case.log_std, &loss, &some);
+    }
 }
 
 #[test]
 fn motion_that_is_certain_and_right_costs_half_of_log_2_pi_per_number() {
     let zero = |shape: &[usize]| Tensor::zeros(shape, DType::F32, &Cpu).unwrap();
     let mean = zero(&[1, 2, 30, 2]);
-    let mixture = Mixture { logits: zero(&[1, 2]), mean: mean.clone(), log_std: mean };
+    let mixture = Mixture { logits: zero(&[1, 2, 1]), mean: mean.clone(), log_std: mean };
     let valid = zero(&[1, 30]).ones_like().unwrap();
-    let loss = scalar(&motion_nll(&mixture, &zero(&[1, 30, 2]), &valid).unwrap());
+    let loss = scalar(&motion_nll(&mixture, &zero(&[1, 30, 2]), &valid, Assign::Soft).unwrap());
     assert!((loss - 0.918_938_533).abs() < 1e-6, "two equal modes are as good as one: {loss}");
 
     // 20 m/s are 2 units: (2^2 / 2) more for each of the 30 speeds, half of the numbers.
     let fast = Tensor::new(&[20f32, 0.0], &Cpu).unwrap().broadcast_as((1, 30, 2)).unwrap();
-    let loss = scalar(&motion_nll(&mixture, &fast, &valid).unwrap());
+    let loss = scalar(&motion_nll(&mixture, &fast, &valid, Assign::Soft).unwrap());
     assert!((loss - 1.918_938_533).abs() < 1e-6, "{loss}");
 }
 
 #[test]
 fn motion_nll_stays_finite_where_every_mode_is_hopeless() {
     let near = Tensor::full(-4.6f32, (1, 3, 30, 2), &Cpu).unwrap(); // std 0.01
-    let logits = Tensor::new(&[[80f32, -80.0, 0.0]], &Cpu).unwrap();
+    let logits = Tensor::new(&[[[80f32], [-80.0], [0.0]]], &Cpu).unwrap();
     let mean = Var::zeros((1, 3, 30, 2), DType::F32, &Cpu).unwrap();
     let mixture = Mixture { logits, mean: mean.as_tensor().clone(), log_std: near };
     let target = Tensor::full(50f32, (1, 30, 2), &Cpu).unwrap();
     let valid = Tensor::ones((1, 30), DType::F32, &Cpu).unwrap();
-    let loss = motion_nll(&mixture, &target, &valid).unwrap();
+    let loss = motion_nll(&mixture, &target, &valid, Assign::Soft).unwrap();
     assert!(scalar(&loss).is_finite());
     let grads = loss.backward().unwrap();
     let largest = grads.get(mean.as_tensor()).unwrap().abs().unwrap().max_all().unwrap();
@@ -181,14 +219,9 @@ fn action_l1_is_the_weighted_mean_over_what_is_known() {
 
 #[test]
 fn what_is_masked_has_no_gradient_and_a_batch_of_nothing_costs_nothing() {
-    let case = Case::new();
+    let case = Case::new(1);
     let nothing = case.valid.zeros_like().unwrap();
-    let mixture = Mixture {
-        logits: case.logits.as_tensor().clone(),
-        mean: case.mean.as_tensor().clone(),
-        log_std: case.log_std.as_tensor().clone(),
-    };
-    let loss = motion_nll(&mixture, &case.target, &nothing).unwrap();
+    let loss = motion_nll(&case.mixture(), &case.target, &nothing, Assign::Soft).unwrap();
     assert_eq!(scalar(&loss), 0.0);
     let grads = loss.backward().unwrap();
     for v in [&case.logits, &case.mean, &case.log_std] {
@@ -196,7 +229,7 @@ fn what_is_masked_has_no_gradient_and_a_batch_of_nothing_costs_nothing() {
         assert_eq!(scalar(&g), 0.0);
     }
     // A sample with 7 valid steps: nothing after the seventh.
-    let grads = case.loss().backward().unwrap();
+    let grads = case.loss(Assign::Soft).backward().unwrap();
     let g = grads.get(case.mean.as_tensor()).unwrap().narrow(0, 1, 1).unwrap();
     let largest =
         |from, len| scalar(&g.narrow(2, from, len).unwrap().abs().unwrap().max_all().unwrap());
@@ -222,7 +255,7 @@ fn two_parameters() -> (Weights, [Tensor; 2]) {
 #[test]
 fn adamw_takes_the_steps_of_its_formula() {
     let (weights, [b, a]) = two_parameters();
-    let mut adam = AdamW::new(&weights, 0.1).unwrap();
+    let mut adam = Adam::new(&weights, 0.1);
     let flat = |t: &Tensor| -> Vec<f64> {
         let t = t.flatten_all().unwrap().to_dtype(DType::F64).unwrap();
         t.to_vec1().unwrap()
@@ -239,8 +272,10 @@ fn adamw_takes_the_steps_of_its_formula() {
         let loss_a = (&a * as_tensor(&c[..4], &a)).unwrap().sum_all().unwrap();
         let loss_b = (&b * as_tensor(&c[4..], &b)).unwrap().sum_all().unwrap();
         let grads = (loss_a + loss_b).unwrap().backward().unwrap();
+        let mut gradient = Gradient::default();
+        gradient.add(&weights, grads).unwrap();
         let lr = 0.01 / t as f64;
-        let norm = adam.step(&grads, lr, 1.0).unwrap();
+        let norm = adam.step(&gradient, lr, 1.0).unwrap();
 
         let by_hand = c.iter().map(|g| g * g).sum::<f64>().sqrt();
         assert!((norm - by_hand).abs() < 1e-6);
@@ -265,9 +300,11 @@ fn adamw_takes_the_steps_of_its_formula() {
 fn gradient_that_is_not_finite_is_named_and_changes_nothing() {
     let (weights, [b, a]) = two_parameters();
     let before = weights.snapshot().unwrap();
-    let mut adam = AdamW::new(&weights, 0.0).unwrap();
+    let mut adam = Adam::new(&weights, 0.0);
     let loss = (a.sum_all().unwrap() + (b.sum_all().unwrap() * f64::INFINITY).unwrap()).unwrap();
-    let error = adam.step(&loss.backward().unwrap(), 1e-3, 1.0).unwrap_err();
+    let mut gradient = Gradient::default();
+    gradient.add(&weights, loss.backward().unwrap()).unwrap();
+    let error = adam.step(&gradient, 1e-3, 1.0).unwrap_err();
     assert!(matches!(error, Error::Diverged { .. }));
     assert_eq!(error.to_string(), "training diverged at step 1: gradient of b is not finite");
     let after = weights.snapshot().unwrap();

@@ -46,7 +46,11 @@ mod samples;
 #[cfg(feature = "learning")]
 mod losses;
 #[cfg(feature = "learning")]
+mod models;
+#[cfg(feature = "learning")]
 mod network;
+#[cfg(feature = "learning")]
+mod recipe;
 #[cfg(feature = "learning")]
 mod training;
 #[cfg(feature = "learning")]

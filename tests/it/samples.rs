@@ -57,7 +57,7 @@ fn halves(values: &[f32]) -> Vec<f16> {
 fn picture_is_shrunk_by_area_and_kept_in_its_colours() {
     let sample = Sample::new(&frame(), SIZE).unwrap();
     let at = |channel: usize, row: usize, column: usize| {
-        sample.camera[(channel * 32 + row) * 80 + column]
+        sample.camera[(row * 80 + column) * 3 + channel]
     };
     for row in 0..32 {
         assert!(at(0, row, 3) > 245 && at(2, row, 3) < 10, "left is red");
@@ -80,7 +80,7 @@ fn nearest_lidar_return_and_fastest_radar_return_win_a_pixel() {
         Some(RadarPixels { pixel: vec![0, 1, 2], speed_mps: Some(halves(&[2.0, -6.0, 5.0])) });
     let sample = Sample::new(&frame, SIZE).unwrap();
     let pixel = |at: usize| -> Vec<f32> {
-        (0..4).map(|channel| sample.ralidar[channel * 32 * 80 + at].to_f32()).collect()
+        (0..4).map(|channel| sample.ralidar[4 * at + channel].to_f32()).collect()
     };
     assert_eq!(pixel(0), [2.0, -2.0, 10.0, -6.0]);
     assert_eq!(pixel(1), [0.0; 4]);
@@ -92,15 +92,20 @@ fn batch_carries_labels_with_masks_and_sensors_with_presence() {
     let mut blind = frame();
     (blind.image, blind.lidar, blind.perturbed) = (vec![], None, true);
     let samples = [Sample::new(&frame(), SIZE).unwrap(), Sample::new(&blind, SIZE).unwrap()];
-    let Batch { inputs, targets } = Batch::stack(&samples, &Cpu).unwrap();
-    assert_eq!(inputs.camera.as_ref().unwrap().dims(), [2, 3, 32, 80]);
-    assert_eq!(inputs.ralidar.as_ref().unwrap().dims(), [2, 4, 32, 80]);
+    let names = vec!["a/7".to_string(), "b/8".to_string()];
+    let batch = Batch::stack(&samples, names, &Cpu).unwrap();
+    let second = &batch.split(2).unwrap()[1];
+    assert_eq!((second.len().unwrap(), &second.frames[..]), (1, &["b/8".to_string()][..]));
+    let Batch { inputs, targets, .. } = batch;
+    assert_eq!(inputs.camera.as_ref().unwrap().dims(), [2, 32, 80, 3]);
+    assert_eq!(inputs.ralidar.as_ref().unwrap().dims(), [2, 32, 80, 4]);
     assert_eq!(inputs.present.to_vec2::<f32>().unwrap(), [[1.0, 1.0], [0.0, 0.0]]);
     assert_eq!(inputs.velocity.to_vec2::<f32>().unwrap()[0], [5.0, 0.1]);
     assert_eq!(inputs.route.to_vec2::<f32>().unwrap()[1][258], 0.2 * 258.0);
     assert_eq!(inputs.command.to_vec1::<u32>().unwrap(), [2, 2]);
     assert_eq!(targets.action.to_vec2::<f32>().unwrap()[0], [-0.2, 0.5, 0.0]);
     assert_eq!(targets.action_known.to_vec2::<f32>().unwrap()[1], [1.0, 1.0, 0.0]);
+    assert_eq!(targets.speed_mps.to_vec1::<f32>().unwrap()[0], 5f32.hypot(0.1));
     let valid = targets.motion_valid.to_vec2::<f32>().unwrap();
     assert_eq!(valid[0].iter().sum::<f32>(), 12.0);
     assert_eq!(valid[1].iter().sum::<f32>(), 0.0, "a disturbed car does not do as it is told");
@@ -116,7 +121,7 @@ fn network_without_pictures_does_not_decode_them() {
     broken.image = vec![1, 2, 3];
     let sample = Sample::new(&broken, None).unwrap();
     assert!(sample.camera.is_empty() && sample.ralidar.is_empty());
-    assert!(Batch::stack(&[sample], &Cpu).unwrap().inputs.camera.is_none());
+    assert!(Batch::stack(&[sample], vec![], &Cpu).unwrap().inputs.camera.is_none());
 }
 
 #[test]

@@ -9,12 +9,14 @@ use std::{
 };
 
 use candle_core::{Device::Cpu, Tensor};
+use clap::ValueEnum as _;
 use pmp::{
     dataset::batch::{Batch, Batches, Inputs, Targets},
     error::{Error, Result},
     model::{
-        config::{NetConfig, Preset, TrainConfig},
+        config::TrainConfig,
         learned::Learned,
+        net_config::{Model, NetConfig, Part, PictureConfig, PmpConfig, Preset},
         run,
         train::{Data, Event, State, train, train_run},
     },
@@ -43,6 +45,15 @@ impl Synthetic {
         Self { frames, salt: 0, size: [8, 16], dies_at: None, nan_at: None }
     }
 
+    pub(crate) fn of_size(frames: usize, size: [usize; 2]) -> Self {
+        Self { size, ..Self::new(frames) }
+    }
+
+    /// The same on a machine that is switched off at a step.
+    pub(crate) fn dying(frames: usize, at: u64) -> Self {
+        Self { dies_at: Some(at), ..Self::new(frames) }
+    }
+
     pub(crate) fn batch_of(&self, step: u64) -> Batch {
         let mut rng = ChaCha8Rng::seed_from_u64(self.salt ^ step);
         let b = self.frames;
@@ -52,8 +63,8 @@ impl Synthetic {
         let tensor =
             |values: Vec<f32>, shape: &[usize]| Tensor::from_vec(values, shape, &Cpu).unwrap();
         let [h, w] = self.size;
-        let camera = tensor(noise(b * 3 * h * w), &[b, 3, h, w]);
-        let ralidar = tensor(noise(b * 4 * h * w), &[b, 4, h, w]);
+        let camera = tensor(noise(b * 3 * h * w), &[b, h, w, 3]);
+        let ralidar = tensor(noise(b * 4 * h * w), &[b, h, w, 4]);
         let (speed, bend) = (noise(b), noise(b));
         let (mut velocity, mut route, mut action, mut motion) = (vec![], vec![], vec![], vec![]);
         for (&speed, &bend) in speed.iter().zip(&bend) {
@@ -66,6 +77,7 @@ impl Synthetic {
             action.extend([(-30.0 * bend).tanh(), speed / 12.0, 1.0 - speed / 12.0]);
             motion.extend((1..=30).flat_map(|t| [speed, bend * speed * 0.1 * t as f32]));
         }
+        let speeds = speed.iter().map(|s| 12.0 * s).collect();
         if self.nan_at == Some(step) {
             action[0] = f32::NAN;
         }
@@ -83,7 +95,9 @@ impl Synthetic {
                 action_known: tensor(vec![1.0; 3 * b], &[b, 3]),
                 motion: tensor(motion, &[b, 30, 2]),
                 motion_valid: tensor(vec![1.0; 30 * b], &[b, 30]),
+                speed_mps: tensor(speeds, &[b]),
             },
+            frames: (0..b).map(|i| format!("synthetic-{step}/{i}")).collect(),
         }
     }
 }
@@ -97,6 +111,21 @@ impl Batches for Synthetic {
     }
 }
 
+/// The PMP network, as small as it gets.
+pub(crate) fn small_net() -> PmpConfig {
+    let NetConfig::Pmp(tiny) = NetConfig::preset(Model::Pmp, Preset::Tiny) else { unreachable!() };
+    PmpConfig {
+        picture: PictureConfig { height: 8, width: 16, channels: vec![4, 8], ..tiny.picture },
+        feature: 16,
+        route_hidden: vec![16],
+        velocity_hidden: vec![8],
+        attention_hidden: vec![8],
+        action_hidden: vec![16],
+        motion_hidden: vec![16],
+        ..tiny
+    }
+}
+
 pub(crate) fn small() -> TrainConfig {
     TrainConfig {
         steps: 13,
@@ -106,23 +135,12 @@ pub(crate) fn small() -> TrainConfig {
         eval_every: 5,
         eval_batches: 2,
         save_every: 4,
-        net: NetConfig {
-            height: 8,
-            width: 16,
-            channels: vec![4, 8],
-            feature: 16,
-            route_hidden: 16,
-            velocity_hidden: 8,
-            attention_hidden: 8,
-            action_hidden: 16,
-            motion_hidden: 16,
-            ..NetConfig::tiny()
-        },
+        net: NetConfig::Pmp(small_net()),
         ..TrainConfig::default()
     }
 }
 
-fn data(train: Synthetic) -> Data {
+pub(crate) fn data(train: Synthetic) -> Data {
     let validation = Synthetic { salt: 1 << 40, dies_at: None, nan_at: None, ..train.clone() };
     Data {
         train: Box::new(train),
@@ -132,7 +150,12 @@ fn data(train: Synthetic) -> Data {
     }
 }
 
-fn run_with(cfg: &TrainConfig, out: &Path, resume: bool, train: Synthetic) -> Result<Vec<Event>> {
+pub(crate) fn run_with(
+    cfg: &TrainConfig,
+    out: &Path,
+    resume: bool,
+    train: Synthetic,
+) -> Result<Vec<Event>> {
     let mut events = vec![];
     train_run(cfg, out, resume, &mut data(train), &Cpu, &mut |event| {
         events.push(event.clone());
@@ -146,7 +169,7 @@ pub(crate) fn run(cfg: &TrainConfig, out: &Path, resume: bool) -> Result<Vec<Eve
 }
 
 /// Every file of a directory, by path within it.
-fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut out = BTreeMap::new();
     for entry in fs::read_dir(dir).unwrap() {
         let path = entry.unwrap().path();
@@ -161,7 +184,7 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
-fn assert_same_files(a: &Path, b: &Path) {
+pub(crate) fn assert_same_files(a: &Path, b: &Path) {
     let (a, b) = (files(a), files(b));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, bytes) in &a {
@@ -176,10 +199,15 @@ fn resumed_run_ends_bit_identical_to_one_never_stopped() {
     let cfg = small();
     run(&cfg, &whole, false).unwrap();
     let names: Vec<_> = files(&whole).into_keys().collect();
+    // The best validation was that of step 10.
     let expected = [
+        "checkpoints/step-00000010/optimizer.safetensors",
+        "checkpoints/step-00000010/weights.safetensors",
         "checkpoints/step-00000013/optimizer.safetensors",
         "checkpoints/step-00000013/weights.safetensors",
         "config.json",
+        "curves.svg",
+        "events.out.tfevents.0.pmp",
         "metrics.jsonl",
         "run.json",
     ];
@@ -222,6 +250,8 @@ fn curves_have_a_line_per_logged_step_and_validation_and_no_clock() {
         "throttle",
         "brake",
         "motion",
+        "entropy",
+        "speed",
         "lr",
         "grad_norm",
     ];
@@ -261,9 +291,9 @@ fn steps_may_be_raised_and_nothing_else_may_change() {
     run(&small(), &out, false).unwrap();
 
     let error = |cfg: TrainConfig| run(&cfg, &out, true).unwrap_err().to_string();
-    let mut other = small();
-    other.net.motion_hidden = 17;
-    assert_eq!(error(other), "net.motion_hidden: the run was started with 16, not 17");
+    let net = NetConfig::Pmp(PmpConfig { motion_hidden: vec![17], ..small_net() });
+    let other = TrainConfig { net, ..small() };
+    assert_eq!(error(other), "net.motion_hidden: the run was started with [16], not [17]");
     assert_eq!(
         error(TrainConfig { lr: 2e-3, ..small() }),
         "lr: the run was started with 0.001, not 0.002"
@@ -328,7 +358,11 @@ fn loss_that_is_not_finite_stops_with_step_and_term_and_keeps_the_last_checkpoin
     let out = dir.path().join("run");
     let broken = Synthetic { nan_at: Some(6), ..Synthetic::new(4) };
     let error = run_with(&small(), &out, false, broken).unwrap_err();
-    assert_eq!(error.to_string(), "training diverged at step 7: action loss is not finite");
+    assert_eq!(
+        error.to_string(),
+        "training diverged at step 7: action loss is not finite; \
+         frames synthetic-6/0, synthetic-6/1, synthetic-6/2, synthetic-6/3"
+    );
     assert_eq!(run::manifest(&out).unwrap().unwrap().step, 4);
 }
 
@@ -364,13 +398,14 @@ fn one_batch_is_learned_by_heart() {
 
 #[test]
 fn loss_falls_on_frames_never_trained_on() {
-    let net = NetConfig { camera: false, ralidar: false, ..small().net };
+    let disable = vec![Part::Camera, Part::Ralidar];
+    let net = NetConfig::Pmp(PmpConfig { disable, ..small_net() });
     let cfg = TrainConfig { steps: 300, lr: 3e-3, eval_every: 150, net, ..small() };
     let mut state = State::new(&cfg, &Cpu).unwrap();
     // Saying the mean of all frames costs 0.28.
     let mut lines = vec![];
     train(&cfg, &mut state, &mut data(Synthetic::new(16)), &mut |_, event| {
-        if let Event::Validated(line) = event {
+        if let Event::Validated { line, .. } = event {
             lines.push(line.terms.action.unwrap());
         }
         Ok(())
@@ -408,7 +443,7 @@ fn checksum_of_a_short_training_at_full_size() {
     let frames = Synthetic { size: [32, 80], ..Synthetic::new(cfg.batch_size) };
     run_with(&cfg, &out, false, frames).unwrap();
     let manifest = run::manifest(&out).unwrap().unwrap();
-    println!("checksum {}", manifest.sha256["weights.safetensors"]);
+    println!("checksum {}", manifest.checkpoints[&manifest.checkpoint]["weights.safetensors"]);
 }
 
 #[test]
@@ -478,7 +513,7 @@ fn trained_run_drives_with_what_its_network_says() {
     let at = |t: &Tensor, k: usize, step: usize, d: usize| {
         t.get(0).unwrap().to_vec3::<f32>().unwrap()[k][step][d]
     };
-    let (mode, motion) = (&plan.motion[2], &said.motion);
+    let (mode, motion) = (&plan.motion[2], said.motion.unwrap());
     assert_eq!(mode.speed_mps[4], 10.0 * at(&motion.mean, 2, 4, 0));
     assert_eq!(mode.yaw_rad[29], at(&motion.mean, 2, 29, 1));
     let std = mode.std.as_ref().unwrap();
@@ -490,26 +525,51 @@ fn trained_run_drives_with_what_its_network_says() {
 
 #[test]
 fn empty_file_is_the_default_run_and_a_file_changes_only_what_it_names() {
-    assert_eq!(TrainConfig::from_toml("", None).unwrap(), TrainConfig::default());
-    let text = "preset = \"nano\"\nsteps = 7\n[net]\ncamera = true\n";
-    let cfg = TrainConfig::from_toml(text, None).unwrap();
-    let net = NetConfig { camera: true, ..NetConfig::nano() };
-    assert_eq!(cfg, TrainConfig { steps: 7, net, ..TrainConfig::preset(Preset::Nano) });
-    let cfg = TrainConfig::from_toml(text, Some(Preset::Tiny)).unwrap();
-    assert!(cfg.net.ralidar, "the command line wins");
+    assert_eq!(TrainConfig::from_toml("", None, None).unwrap(), TrainConfig::default());
+    let text = "model = \"blind\"\npreset = \"small\"\nsteps = 7\n[net.picture]\nheight = 40\n";
+    let cfg = TrainConfig::from_toml(text, None, None).unwrap();
+    let mut expected = TrainConfig::preset(Model::Blind, Preset::Small);
+    expected.steps = 7;
+    let NetConfig::Pmp(net) = &mut expected.net else { unreachable!() };
+    net.picture.height = 40;
+    assert_eq!(cfg, expected);
+    let cfg = TrainConfig::from_toml(text, Some(Model::Pmp), Some(Preset::Tiny)).unwrap();
+    assert_eq!((cfg.model, cfg.preset), (Model::Pmp, Preset::Tiny), "the command line wins");
+}
+
+#[test]
+fn every_preset_of_every_model_is_a_configuration_that_comes_back_from_its_file() {
+    for model in Model::value_variants() {
+        for preset in Preset::value_variants() {
+            let config = TrainConfig::preset(*model, *preset);
+            config.validate().unwrap();
+            let text = toml::to_string(&config).unwrap();
+            assert_eq!(TrainConfig::from_toml(&text, None, None).unwrap(), config);
+            let text = serde_json::to_string(&config).unwrap();
+            assert_eq!(serde_json::from_str::<TrainConfig>(&text).unwrap(), config);
+        }
+    }
 }
 
 #[test]
 fn unknown_key_and_value_out_of_range_are_named_in_the_error() {
-    let error = |text: &str| TrainConfig::from_toml(text, None).unwrap_err().to_string();
-    assert!(error("stepz = 7").contains("unknown field `stepz`"), "{}", error("stepz = 7"));
-    assert!(error("[net]\nmode = 7").contains("unknown field `mode`"));
-    assert!(error("preset = \"huge\"").contains("unknown variant `huge`"));
-    assert_eq!(error("batch_size = 0"), "batch_size: must be at least 1");
-    assert_eq!(error("lr = nan"), "lr: must be above 0");
+    let error = |text: &str| TrainConfig::from_toml(text, None, None).unwrap_err();
+    let unknown = error("stepz = 7");
+    assert_eq!(unknown.to_string(), "stepz: there is no such key");
+    assert!(unknown.hint().unwrap().starts_with("`steps` is the nearest"), "{unknown:?}");
+    let unknown = error("[net.picture]\nhieght = 7");
+    assert_eq!(unknown.to_string(), "net.picture.hieght: there is no such key");
+    assert!(unknown.hint().unwrap().starts_with("`net.picture.height` is the nearest"));
+    assert!(error("preset = \"huge\"").to_string().contains("unknown variant `huge`"));
+    assert_eq!(error("batch_size = 0").to_string(), "batch_size: must be at least 1");
+    assert_eq!(error("lr = nan").to_string(), "lr: must be above 0");
     assert_eq!(
-        error("[net]\nheight = 40"),
-        "net.height: must be a multiple of 16: it is halved by every convolution"
+        error("model = \"cil\"\npreset = \"paper\"\n[net.picture]\nheight = 40").to_string(),
+        "net.picture.height: must be in 77 ... 4096"
+    );
+    assert_eq!(
+        error("[net]\ndisable = [\"camera\", \"ralidar\", \"route\", \"velocity\"]").to_string(),
+        "net.disable: leaves the network without any input"
     );
 }
 
