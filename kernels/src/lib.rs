@@ -6,6 +6,7 @@
 //!   -> norm    batch norm with residual addition and ReLU, both passes
 //!   -> pooling maximum and mean
 //!   -> adam    one step, sum of squares
+//!   -> resnet  a whole residual network, both passes
 //! ```
 //!
 //! Activations are `[B, H, W, C]`, the channel fastest; weights come and go in PyTorch's order
@@ -25,3 +26,4 @@ pub mod conv;
 pub mod norm;
 pub mod pooling;
 pub mod adam;
+pub mod resnet;

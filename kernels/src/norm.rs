@@ -257,6 +257,18 @@ impl Backward {
     }
 }
 
+/// `sum += x`.
+///
+/// # Panics
+///
+/// If lengths disagree.
+pub fn add(x: &[f32], sum: &mut [f32]) {
+    assert_eq!(x.len(), sum.len(), "as many numbers");
+    sum.par_chunks_mut(PIECE).zip(x.par_chunks(PIECE)).for_each(|(sum, x)| {
+        widest(|| sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += x));
+    });
+}
+
 /// No gradient where nothing came out of the ReLU.
 fn close(grad: &mut [f32], out: &[f32]) {
     widest(Close { grad, out });

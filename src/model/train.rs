@@ -20,6 +20,7 @@ use crate::{
         loss::{Known, LossSums, Tally, Terms},
         metrics::{Side, TrainLine, ValidationLine},
         network::Network,
+        ops::gradients::backward,
         pass::Pass,
         pretrained,
         run::{Best, Checkpoint, Progress, RunDir, Snapshot},
@@ -172,7 +173,7 @@ fn descend(cfg: &TrainConfig, state: &State, batch: &Batch) -> Result<(Terms, Gr
             return Err(error.of_frames(&micro.frames));
         }
         tally.add(&its);
-        gradient.add(&state.weights, sums.total(&cfg.loss, &known)?.backward()?)?;
+        gradient.add(&state.weights, backward(&sums.total(&cfg.loss, &known)?)?)?;
     }
     Ok((tally.terms(&cfg.loss), gradient))
 }

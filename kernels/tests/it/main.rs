@@ -7,3 +7,4 @@ mod norms;
 mod poolings;
 mod adams;
 mod memory;
+mod pytorch;

@@ -3,7 +3,7 @@
 use pmp_kernels::{conv, pooling};
 
 /// `count` numbers in -1 ... 1 that look random and are the same everywhere.
-pub fn numbers(seed: u64, count: usize) -> Vec<f32> {
+pub(crate) fn numbers(seed: u64, count: usize) -> Vec<f32> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x1234_5678_9abc_def1);
     let mut next = || {
         state ^= state << 13;
@@ -15,7 +15,7 @@ pub fn numbers(seed: u64, count: usize) -> Vec<f32> {
 }
 
 /// Calls `f` with the index of each (output, input, weight) that are multiplied.
-pub fn products(s: &conv::Shape, mut f: impl FnMut(usize, usize, usize)) {
+pub(crate) fn products(s: &conv::Shape, mut f: impl FnMut(usize, usize, usize)) {
     let [height, width] = s.out_size().unwrap();
     for b in 0..s.batch {
         for oy in 0..height {
@@ -46,27 +46,27 @@ pub fn products(s: &conv::Shape, mut f: impl FnMut(usize, usize, usize)) {
     }
 }
 
-pub fn conv(s: &conv::Shape, x: &[f32], weight: &[f32], bias: Option<&[f32]>) -> Vec<f64> {
+pub(crate) fn conv(s: &conv::Shape, x: &[f32], weight: &[f32], bias: Option<&[f32]>) -> Vec<f64> {
     let channel = |i: usize| bias.map_or(0.0, |bias| f64::from(bias[i % s.out_channels]));
     let mut out: Vec<f64> = (0..s.output_len()).map(channel).collect();
     products(s, |o, i, w| out[o] += f64::from(x[i]) * f64::from(weight[w]));
     out
 }
 
-pub fn conv_input(s: &conv::Shape, grad: &[f32], weight: &[f32]) -> Vec<f64> {
+pub(crate) fn conv_input(s: &conv::Shape, grad: &[f32], weight: &[f32]) -> Vec<f64> {
     let mut out = vec![0.0; s.input_len()];
     products(s, |o, i, w| out[i] += f64::from(grad[o]) * f64::from(weight[w]));
     out
 }
 
-pub fn conv_weight(s: &conv::Shape, x: &[f32], grad: &[f32]) -> Vec<f64> {
+pub(crate) fn conv_weight(s: &conv::Shape, x: &[f32], grad: &[f32]) -> Vec<f64> {
     let mut out = vec![0.0; s.weight_len()];
     products(s, |o, i, w| out[w] += f64::from(grad[o]) * f64::from(x[i]));
     out
 }
 
 /// Maxima and the pixels they come from.
-pub fn max(s: &pooling::Shape, x: &[f32]) -> (Vec<f32>, Vec<usize>) {
+pub(crate) fn max(s: &pooling::Shape, x: &[f32]) -> (Vec<f32>, Vec<usize>) {
     let [height, width] = s.out_size().unwrap();
     let (mut out, mut from) = (vec![], vec![]);
     for b in 0..s.batch {
@@ -99,7 +99,7 @@ pub fn max(s: &pooling::Shape, x: &[f32]) -> (Vec<f32>, Vec<usize>) {
 }
 
 /// Largest difference, as a share of the largest number.
-pub fn off(got: &[f32], want: &[f64]) -> f64 {
+pub(crate) fn off(got: &[f32], want: &[f64]) -> f64 {
     assert_eq!(got.len(), want.len());
     let size = want.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
     let off = got.iter().zip(want).fold(0.0, |off: f64, (got, want)| {
@@ -110,7 +110,7 @@ pub fn off(got: &[f32], want: &[f64]) -> f64 {
 }
 
 /// What `f` gives on 1, 2 and 3 threads.
-pub fn on_threads<T: Send>(f: impl Fn() -> T + Sync) -> [T; 3] {
+pub(crate) fn on_threads<T: Send>(f: impl Fn() -> T + Sync) -> [T; 3] {
     [1, 2, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(&f)
@@ -118,7 +118,7 @@ pub fn on_threads<T: Send>(f: impl Fn() -> T + Sync) -> [T; 3] {
 }
 
 /// Asserts that `f` gives the same bits on 1, 2 and 3 threads.
-pub fn same_bits(f: impl Fn() -> Vec<f32> + Sync) {
+pub(crate) fn same_bits(f: impl Fn() -> Vec<f32> + Sync) {
     let [one, two, three] = on_threads(|| f().iter().map(|x| x.to_bits()).collect::<Vec<_>>());
     assert!(one == two, "two threads differ from one");
     assert!(one == three, "three threads differ from one");
