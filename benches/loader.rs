@@ -27,8 +27,7 @@ fn main() {
     let size = side().zip(side()).map(|(height, width)| InputSize { height, width });
     let dataset = Arc::new(Dataset::open(Path::new(&data)).unwrap());
     let sampling = SamplingConfig::default();
-    let mut batches =
-        TrainBatches::new(dataset, size, BATCH, 0, &sampling, &Device::Cpu).unwrap();
+    let mut batches = TrainBatches::new(dataset, size, BATCH, 0, &sampling, &Device::Cpu).unwrap();
     let (steps, before) = (batches.steps_per_epoch(), cpu_s());
     let mut sum = 0.0;
     for step in 0..steps {

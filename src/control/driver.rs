@@ -114,7 +114,11 @@ impl Driver {
             pedals if pedals > 0.0 => (pedals.min(config.max_throttle), 0.0),
             pedals => (0.0, (-pedals).min(1.0)),
         };
-        Action { steer: steer.clamp(-1.0, 1.0) as f32, throttle: throttle as f32, brake: brake as f32 }
+        Action {
+            steer: steer.clamp(-1.0, 1.0) as f32,
+            throttle: throttle as f32,
+            brake: brake as f32,
+        }
     }
 
     /// Never both pedals, and no brushing of the brake.

@@ -2,9 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    policy::{Action, ModeStd},
-};
+use crate::policy::{Action, ModeStd};
 
 /// Speeds are in units of this where variances are summed, so that they are of the size of yaw
 /// angles; the unit of the mixture that is learned.

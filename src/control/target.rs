@@ -1,9 +1,6 @@
 //! Where a planned motion leads: the place some metres ahead, and the speed there.
 
-use crate::{
-    frame::FUTURE_STEPS,
-    policy::Mode,
-};
+use crate::{frame::FUTURE_STEPS, policy::Mode};
 
 /// What to steer and accelerate to.
 #[derive(Clone, Copy, Debug, PartialEq)]
