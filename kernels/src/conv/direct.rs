@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::{
@@ -14,11 +15,11 @@ use crate::{
     norm::Affine,
     pieces::{Block, add_up, blocks, shares, split},
     product::{Matrix, multiply},
-    simd::widest,
+    simd::{load, store, widest},
 };
 
-/// Channels of a result that are computed together, a multiple of what `gemm` takes at once.
-const TOGETHER: usize = 96;
+/// Channels of a result that are computed together, what `gemm` takes at once.
+const TOGETHER: usize = 64;
 
 /// Numbers of a share's rows: half a second-level cache.
 const SHARE: usize = 1 << 17;
@@ -55,14 +56,30 @@ impl Picture<'_> {
             part[to * c..].fill(0.0);
             let inside = &mut part[from * c..to * c];
             inside.copy_from_slice(&self.input.x[first..][..inside.len()]);
-            if let Some(Affine { scale, shift }) = self.input.affine {
-                widest(|| {
-                    for pixel in inside.chunks_exact_mut(c) {
-                        for ((x, scale), shift) in pixel.iter_mut().zip(scale).zip(shift) {
-                            *x = x.mul_add(*scale, *shift).max(0.0);
-                        }
-                    }
-                });
+            if let Some(map) = self.input.affine {
+                widest(Relu { map, pixels: inside });
+            }
+        }
+    }
+}
+
+/// The ReLU of a map of each channel, in place.
+struct Relu<'a> {
+    map: Affine<'a>,
+    pixels: &'a mut [f32],
+}
+
+impl WithSimd for Relu<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { map: Affine { scale, shift }, pixels } = self;
+        for pixel in pixels.chunks_exact_mut(scale.len()) {
+            for at in (0..pixel.len()).step_by(S::F32_LANES) {
+                let (scale, shift) = (load(simd, scale, at), load(simd, shift, at));
+                let value = simd.mul_add_f32s(load(simd, pixel, at), scale, shift);
+                store(simd, pixel, at, simd.max_f32s(value, simd.splat_f32s(0.0)));
             }
         }
     }
