@@ -136,6 +136,7 @@ fn main() {
     let (threads, warm, steps) = (number(threads), number(warm), number(steps));
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().unwrap();
     let start = peak();
+    pmp_kernels::buffers::keep_freed_memory();
 
     let read = |name: &str| candle_core::safetensors::load(Path::new(folder).join(name), &Cpu).unwrap();
     let mut data: HashMap<String, Tensor> = read("batch.safetensors");

@@ -42,7 +42,11 @@ fn main() {
         }
         layers.push((2 * blocks - usize::from(i > 0), of(h, w, c, c, 3, 1)));
     }
-    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().expect("no other pool yet");
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build_global()
+        .expect("no other pool yet");
     println!("ms of a layer: forward, gradient of the input, of the weight; * chosen");
     for (count, s) in layers {
         let flops = 2.0 * (s.output_len() * s.channels * s.kernel[0] * s.kernel[1]) as f64;

@@ -65,6 +65,7 @@ mod scene;
 mod flow;
 mod recording;
 mod one_pixel;
+#[cfg(feature = "learning")]
 mod operations;
 mod replay;
 mod ranging;

@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use crate::{
     buffers::Buffer,
     conv::{Input, Shape},
+    foreign::{Matrix, multiply},
     norm::Affine,
     pieces::{Block, add_up, blocks, shares, split},
-    product::{Matrix, multiply},
     simd::{load, store, widest},
 };
 
@@ -125,12 +125,9 @@ pub(crate) fn forward(
     if out.is_empty() || depth == 0 {
         return fill_rows(out, o, bias);
     }
-    let weight = pack(o, depth, |channels, packed| {
-        for (o, channel) in channels.clone().enumerate() {
-            for (i, weight) in weight[channel * depth..][..depth].iter().enumerate() {
-                packed[(i % taps * c + i / taps) * channels.len() + o] = *weight;
-            }
-        }
+    let weight = pack(o, depth, |few, packed| {
+        let weight = &weight[few.start * depth..few.end * depth];
+        turn([few.len(), c, taps], |from, to| packed[to] = weight[from]);
     });
     let picture = shape.picture(x);
     let each = (SHARE / depth).clamp(16, 512);
@@ -202,16 +199,18 @@ pub(crate) fn backward_input(shape: &Shape, grad_out: &[f32], weight: &[f32], gr
             let count =
                 [0, 1].map(|i| shape.kernel[i].saturating_sub(first[i]).div_ceil(shape.stride[i]));
             let packed = pack(c, count[0] * count[1] * o, |channels, packed| {
-                for (i, channel) in channels.clone().enumerate() {
+                for o_i in 0..o {
+                    let weight = &weight[(o_i * c + channels.start) * taps..];
                     for y in 0..count[0] {
                         for x in 0..count[1] {
                             // Backwards, so that the pixels gathered lie in their order.
                             let kernel_y = first[0] + down * (count[0] - 1 - y);
                             let kernel_x = first[1] + right * (count[1] - 1 - x);
                             let tap = kernel_y * shape.kernel[1] + kernel_x;
-                            for o_i in 0..o {
-                                let at = ((y * count[1] + x) * o + o_i) * channels.len() + i;
-                                packed[at] = weight[(o_i * c + channel) * taps + tap];
+                            let at = ((y * count[1] + x) * o + o_i) * channels.len();
+                            let row = &mut packed[at..at + channels.len()];
+                            for (i, packed) in row.iter_mut().enumerate() {
+                                *packed = weight[i * taps + tap];
                             }
                         }
                     }
@@ -298,10 +297,21 @@ pub(crate) fn backward_weight(shape: &Shape, x: Input, grad_out: &[f32], grad_we
     together.par_iter().zip(grads).zip(sums).for_each(|((few, grad), parts)| {
         let mut sum = Buffer::any(grad.len());
         add_up(parts, &mut sum);
-        for (o, grad) in grad.chunks_exact_mut(depth).enumerate() {
-            for (i, grad) in grad.iter_mut().enumerate() {
-                *grad = sum[(i % taps * c + i / taps) * few.len() + o];
+        turn([few.len(), c, taps], |to, from| grad[to] = sum[from]);
+    });
+}
+
+/// Calls `pair` with the places of each number in `[few][c][taps]` and in `[taps][c][few]`, a few
+/// rows of both at a time, so that what is touched stays in the cache.
+#[inline(always)]
+fn turn([few, c, taps]: [usize; 3], mut pair: impl FnMut(usize, usize)) {
+    for rows in shares(few, 16) {
+        for channel in 0..c {
+            for tap in 0..taps {
+                for row in rows.clone() {
+                    pair((row * c + channel) * taps + tap, (tap * c + channel) * few + row);
+                }
             }
         }
-    });
+    }
 }

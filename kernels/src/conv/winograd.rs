@@ -15,9 +15,9 @@ use rayon::prelude::*;
 use crate::{
     buffers::Buffer,
     conv::{Input, Shape, tile},
+    foreign::{Matrix, multiply},
     norm::Affine,
     pieces::{Block, add_up, blocks, shares, split},
-    product::{Matrix, multiply},
     simd::{load, store, widest},
 };
 
