@@ -101,7 +101,8 @@ fn loss([action, motion]: &[Tensor; 2], batch: &Batch) -> candle_core::Result<Te
     let l1 = (action - &batch.action)?.abs()?.mean_all()?;
     let logits = log_softmax(&motion.narrow(1, 0, MODES)?, 1)?;
     let numbers = motion.narrow(1, MODES, MODES * 4 * STEPS)?.reshape(((), MODES, 4 * STEPS))?;
-    let (mean, log_std) = (numbers.narrow(2, 0, 2 * STEPS)?, numbers.narrow(2, 2 * STEPS, 2 * STEPS)?);
+    let (mean, log_std) =
+        (numbers.narrow(2, 0, 2 * STEPS)?, numbers.narrow(2, 2 * STEPS, 2 * STEPS)?);
     let off = batch.motion.unsqueeze(1)?.broadcast_sub(&mean)?;
     let off = (off * log_std.neg()?.exp()?)?;
     let half_log_tau = 0.5 * (2.0 * std::f64::consts::PI).ln();
@@ -130,7 +131,9 @@ fn peak() -> f64 {
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let [folder, mode, threads, warm, steps] = &args[..] else {
-        return println!("train FOLDER train|forward THREADS WARM STEPS; see scripts/bench_train.sh");
+        return println!(
+            "train FOLDER train|forward THREADS WARM STEPS; see scripts/bench_train.sh"
+        );
     };
     let number = |text: &String| text.parse::<usize>().unwrap();
     let (threads, warm, steps) = (number(threads), number(warm), number(steps));
@@ -138,7 +141,8 @@ fn main() {
     let start = peak();
     pmp_kernels::buffers::keep_freed_memory();
 
-    let read = |name: &str| candle_core::safetensors::load(Path::new(folder).join(name), &Cpu).unwrap();
+    let read =
+        |name: &str| candle_core::safetensors::load(Path::new(folder).join(name), &Cpu).unwrap();
     let mut data: HashMap<String, Tensor> = read("batch.safetensors");
     let mut get = |name: &str| data.remove(name).unwrap();
     let batch = Batch {

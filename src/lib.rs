@@ -23,6 +23,7 @@ pub mod log;
 pub mod noise;
 pub mod footprint;
 pub mod policy;
+pub mod control;
 pub mod dataset;
 pub mod map;
 pub mod towns;

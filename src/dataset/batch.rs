@@ -5,10 +5,11 @@
 
 use std::borrow::Borrow;
 
-use candle_core::{DType, Device, Tensor};
+use candle_core::{Device, Tensor};
+use rayon::prelude::*;
 
 use crate::{
-    dataset::sample::Sample,
+    dataset::{augment::Disturbance, sample::Sample},
     error::Result,
     frame::{FUTURE_STEPS, ROUTE_POINTS},
 };
@@ -36,29 +37,79 @@ impl Inputs {
     /// # Errors
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if there is no sample, or their sizes differ.
-    pub fn stack<S: Borrow<Sample>>(samples: &[S], device: &Device) -> Result<Self> {
+    pub fn stack<S: Borrow<Sample> + Sync>(samples: &[S], device: &Device) -> Result<Self> {
+        Self::stack_disturbed(samples, &|_row| Disturbance::none(), device)
+    }
+
+    /// The same, with something done to each row.
+    ///
+    /// # Errors
+    ///
+    /// As [`stack`](Self::stack).
+    pub fn stack_disturbed<S: Borrow<Sample> + Sync>(
+        samples: &[S],
+        disturbance: &(dyn Fn(u64) -> Disturbance + Sync),
+        device: &Device,
+    ) -> Result<Self> {
         let n = samples.len();
         let rows = || samples.iter().map(Borrow::borrow);
+        let mut present: Vec<[bool; 2]> = rows().map(|sample| sample.present).collect();
         let (mut camera, mut ralidar) = (None, None);
         if let Some(size) = rows().next().and_then(|s| s.size) {
+            let area = size.height * size.width;
+            if rows().any(|sample| sample.size != Some(size)) {
+                return Err(candle_core::Error::msg("samples of several sizes").into());
+            }
+            let (mut rgb, mut returns) = (vec![0f32; 3 * n * area], vec![0f32; 4 * n * area]);
+            let pictures = rgb.par_chunks_mut(3 * area).zip(returns.par_chunks_mut(4 * area));
+            let each = pictures.zip(samples).zip(&mut present).enumerate();
+            each.for_each(|(row, (((rgb, returns), sample), present))| {
+                let mut disturbance = disturbance(row as u64);
+                present[0] &= !disturbance.without_camera;
+                present[1] &= !disturbance.without_ralidar;
+                fill(sample.borrow(), *present, &mut disturbance, rgb, returns);
+            });
             let shape = |channels| (n, size.height, size.width, channels);
-            let rgb: Vec<u8> = rows().flat_map(|s| &s.camera).copied().collect();
-            let rgb = Tensor::from_vec(rgb, shape(3), device)?.to_dtype(DType::F32)?;
-            camera = Some((rgb / 255.0)?);
-            let returns: Vec<_> = rows().flat_map(|s| &s.ralidar).copied().collect();
-            ralidar = Some(Tensor::from_vec(returns, shape(4), device)?.to_dtype(DType::F32)?);
+            camera = Some(Tensor::from_vec(rgb, shape(3), device)?);
+            ralidar = Some(Tensor::from_vec(returns, shape(4), device)?);
         }
         let floats = |each: fn(&Sample) -> Vec<f32>, width: usize| {
             Tensor::from_vec(rows().flat_map(each).collect(), (n, width), device)
         };
+        let present: Vec<f32> = present.iter().flatten().map(|p| f32::from(u8::from(*p))).collect();
         Ok(Self {
             camera,
             ralidar,
             velocity: floats(|s| s.velocity_mps.to_vec(), 2)?,
             route: floats(|s| s.route_m.to_vec(), 2 * ROUTE_POINTS)?,
             command: Tensor::from_vec(rows().map(|s| s.command).collect(), n, device)?,
-            present: floats(|s| s.present.map(|p| f32::from(u8::from(p))).to_vec(), 2)?,
+            present: Tensor::from_vec(present, (n, 2), device)?,
         })
+    }
+}
+
+/// The pictures of a sample, `[H, W, 3]` and `[H, W, 4]`, into zeros.
+fn fill(
+    sample: &Sample,
+    present: [bool; 2],
+    disturbance: &mut Disturbance,
+    rgb: &mut [f32],
+    returns: &mut [f32],
+) {
+    if present[0] {
+        let [red, green, blue] = &disturbance.tones;
+        for (to, from) in rgb.chunks_exact_mut(3).zip(sample.camera.chunks_exact(3)) {
+            let [r, g, b] = [from[0], from[1], from[2]].map(usize::from);
+            to.copy_from_slice(&[red[r], green[g], blue[b]]);
+        }
+    }
+    if present[1] {
+        for (&pixel, value) in sample.ralidar_pixel.iter().zip(&sample.ralidar) {
+            if disturbance.keeps_point() {
+                let at = 4 * pixel as usize;
+                returns[at..at + 4].copy_from_slice(&value.map(f32::from));
+            }
+        }
     }
 }
 
@@ -121,15 +172,16 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Samples with their names as one batch on a device; errors as [`Inputs::stack`] and
-    /// [`Targets::stack`].
-    pub fn stack<S: Borrow<Sample>>(
+    /// Samples with their names as one batch on a device, something done to the inputs of each
+    /// row; errors as [`Inputs::stack`] and [`Targets::stack`].
+    pub fn stack<S: Borrow<Sample> + Sync>(
         samples: &[S],
         frames: Vec<String>,
+        disturbance: &(dyn Fn(u64) -> Disturbance + Sync),
         device: &Device,
     ) -> Result<Self> {
         Ok(Self {
-            inputs: Inputs::stack(samples, device)?,
+            inputs: Inputs::stack_disturbed(samples, disturbance, device)?,
             targets: Targets::stack(samples, device)?,
             frames,
         })

@@ -175,19 +175,51 @@ fn fixed<T: ArrowPrimitiveType>(
 ///
 /// A sentence, if a column is missing, has another type, or holds a word that is none of its.
 pub fn to_frames(batch: &RecordBatch) -> Result<Vec<(String, Frame)>, String> {
-    let columns = Columns { batch };
+    let columns = Columns::of(batch);
     (0..batch.num_rows()).map(|row| columns.frame(row)).collect()
 }
 
-struct Columns<'b> {
+/// A batch of rows, columns by name. Every reader's error is a sentence about the column.
+pub struct Columns<'b> {
     batch: &'b RecordBatch,
 }
 
-impl Columns<'_> {
+impl<'b> Columns<'b> {
+    pub fn of(batch: &'b RecordBatch) -> Self {
+        Columns { batch }
+    }
+
+    /// Tick on the grid.
+    pub fn index(&self, row: usize) -> Result<u32, String> {
+        Ok(self.number::<UInt32Type>("frame", row)?.unwrap_or_default())
+    }
+
+    pub fn perturbed(&self, row: usize) -> Result<bool, String> {
+        Ok(self.flag("perturbed", row)?.unwrap_or_default())
+    }
+
+    /// Steer, throttle, brake.
+    pub fn action(&self, row: usize) -> Result<[Option<f32>; 3], String> {
+        let number = |name: &str| self.number::<Float32Type>(name, row);
+        Ok([number("steer")?, number("throttle")?, number("brake")?])
+    }
+
+    pub fn command(&self, row: usize) -> Result<Command, String> {
+        let word = self.word("command", row)?;
+        Command::from_name(&word).ok_or(format!("`{word}` is no command"))
+    }
+
+    pub fn velocity_mps(&self, row: usize) -> Result<[f32; 2], String> {
+        self.fixed::<Float32Type, 2>("velocity", row)
+    }
+
+    fn word(&self, name: &str, row: usize) -> Result<String, String> {
+        self.text(name, row)?.ok_or(format!("column `{name}` has a null"))
+    }
+
     fn frame(&self, row: usize) -> Result<(String, Frame), String> {
-        let word = |name: &str| self.text(name, row)?.ok_or(format!("column `{name}` has a null"));
-        let source = word("route_source")?;
-        let command = word("command")?;
+        let source = self.word("route_source", row)?;
+        let [steer, throttle, brake] = self.action(row)?;
         let lidar = match self.list::<UInt32Type>("lidar_pixel", row)? {
             Some(pixel) => Some(LidarPixels {
                 pixel,
@@ -205,26 +237,22 @@ impl Columns<'_> {
             None => None,
         };
         let frame = Frame {
-            index: self.number::<UInt32Type>("frame", row)?.unwrap_or_default(),
+            index: self.index(row)?,
             stamp_ns: self.number::<TimestampNanosecondType>("stamp", row)?.unwrap_or_default(),
             image: self.bytes("image", row)?,
             lidar,
             radar,
-            velocity_mps: self.fixed::<Float32Type, 2>("velocity", row)?,
+            velocity_mps: self.velocity_mps(row)?,
             yaw_rad: self.number::<Float64Type>("yaw", row)?.unwrap_or_default(),
             position_m: self.fixed::<Float64Type, 3>("position", row)?,
-            action: RecordedAction {
-                steer: self.number::<Float32Type>("steer", row)?,
-                throttle: self.number::<Float32Type>("throttle", row)?,
-                brake: self.number::<Float32Type>("brake", row)?,
-            },
+            action: RecordedAction { steer, throttle, brake },
             route: Route {
                 waypoints_m: self.fixed::<Float32Type, { 2 * ROUTE_POINTS }>("route", row)?,
                 len: self.number::<UInt8Type>("route_len", row)?.unwrap_or_default(),
                 source: RouteSource::from_name(&source)
                     .ok_or(format!("`{source}` is no route source"))?,
             },
-            command: Command::from_name(&command).ok_or(format!("`{command}` is no command"))?,
+            command: self.command(row)?,
             future: Future {
                 speed_mps: self.fixed::<Float32Type, FUTURE_STEPS>("future_speed", row)?,
                 yaw_rad: self.fixed::<Float32Type, FUTURE_STEPS>("future_yaw", row)?,
@@ -245,9 +273,9 @@ impl Columns<'_> {
             },
             in_junction: self.flag("in_junction", row)?,
             speed_limit_mps: self.number::<Float32Type>("speed_limit", row)?,
-            perturbed: self.flag("perturbed", row)?.unwrap_or_default(),
+            perturbed: self.perturbed(row)?,
         };
-        Ok((word("episode")?, frame))
+        Ok((self.word("episode", row)?, frame))
     }
 
     /// The column if its row is not null.

@@ -10,14 +10,18 @@ use std::{
 
 use candle_core::Device;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     dataset::{
+        augment::{AugmentConfig, Disturbance},
+        balance::Balance,
         batch::{Batch, Batches},
         open::{Dataset, GroupRows, Row},
         order::{Order, Position},
         sample::{InputSize, Sample},
         split::Split,
+        traits::Traits,
     },
     error::{Error, Result},
     frame::Frame,
@@ -87,7 +91,12 @@ impl Groups {
         Ok(samples)
     }
 
-    fn batch(&mut self, positions: &[Position], device: &Device) -> Result<Batch> {
+    fn batch(
+        &mut self,
+        positions: &[Position],
+        disturbance: &(dyn Fn(u64) -> Disturbance + Sync),
+        device: &Device,
+    ) -> Result<Batch> {
         let mut groups: BTreeMap<u32, Arc<Vec<Named>>> = BTreeMap::new();
         for (group, _) in positions {
             if !groups.contains_key(group) {
@@ -97,15 +106,24 @@ impl Groups {
         let at = |(group, row): &Position| &groups[group][*row as usize];
         let samples: Vec<&Sample> = positions.iter().map(|p| &at(p).1).collect();
         let names = positions.iter().map(|p| at(p).0.clone()).collect();
-        Batch::stack(&samples, names, device)
+        Batch::stack(&samples, names, disturbance, device)
     }
 }
 
 /// Bytes that a prepared sample takes, about.
 fn sample_bytes(size: Option<InputSize>) -> usize {
     let pixels = size.map_or(0, |size| size.height * size.width);
-    // RGB in bytes, four channels in half floats.
-    size_of::<Sample>() + pixels * (3 + 4 * 2)
+    // RGB in bytes, and returns on some twentieth of the pixels, on all of a small picture.
+    size_of::<Sample>() + pixels * 3 + pixels.min(7500) * (4 + 4 * 2)
+}
+
+/// How frames are drawn and what is done to them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SamplingConfig {
+    /// 0 shows every frame as often as any other, 1 the kinds of moments as evenly as it goes.
+    pub balance: f64,
+    pub augment: AugmentConfig,
 }
 
 /// Shuffled batches of the training side, made ahead on a thread of their own.
@@ -113,9 +131,13 @@ pub struct TrainBatches {
     dataset: Arc<Dataset>,
     size: Option<InputSize>,
     order: Order,
+    seed: u64,
+    augment: AugmentConfig,
     device: Device,
     /// The step that comes next, and where from.
     ahead: Option<(u64, Receiver<Result<Batch>>)>,
+    /// How often kinds of frames are shown.
+    pub balance: Balance,
 }
 
 impl TrainBatches {
@@ -129,6 +151,7 @@ impl TrainBatches {
         size: Option<InputSize>,
         batch_size: usize,
         seed: u64,
+        sampling: &SamplingConfig,
         device: &Device,
     ) -> Result<TrainBatches> {
         if dataset.train.is_empty() {
@@ -138,12 +161,19 @@ impl TrainBatches {
                 hint: Some("ingest more logs, or longer ones".to_string()),
             });
         }
-        let frames = dataset.train.groups.iter().map(|group| group.rows.len() as u32).collect();
+        let groups = dataset.train.groups.iter();
+        let traits: Vec<Vec<Traits>> =
+            groups.map(|group| group.rows.iter().map(|row| row.traits).collect()).collect();
+        let mut frames = vec![0; Traits::COUNT];
+        traits.iter().flatten().for_each(|traits| frames[traits.index()] += 1);
+        let balance = Balance::new(&frames, sampling.balance);
         let groups = Groups::new(dataset.clone(), Split::Train, size);
         // Half of what fits, so that a window stays in memory while the next one comes.
         let window_groups = (groups.cache_groups / 2).clamp(1, WINDOW_GROUPS);
-        let order = Order::new(frames, seed, batch_size, window_groups);
-        Ok(TrainBatches { dataset, size, order, device: device.clone(), ahead: None })
+        let traits = Arc::new(traits);
+        let order = Order::new(traits, balance.clone(), seed, batch_size, window_groups);
+        let (augment, device) = (sampling.augment, device.clone());
+        Ok(TrainBatches { dataset, size, order, seed, augment, device, ahead: None, balance })
     }
 
     /// Steps until every frame was seen.
@@ -155,10 +185,13 @@ impl TrainBatches {
         let (send, receive) = sync_channel(AHEAD);
         let mut groups = Groups::new(self.dataset.clone(), Split::Train, self.size);
         let (mut order, device) = (self.order.clone(), self.device.clone());
+        let (augment, seed) = (self.augment, self.seed);
         std::thread::spawn(move || {
             for step in first.. {
+                let disturbance = |row| augment.disturbance(seed, step, row);
+                let batch = groups.batch(&order.batch(step), &disturbance, &device);
                 // A batch that nobody wants any more ends the thread.
-                if send.send(groups.batch(order.batch(step), &device)).is_err() {
+                if send.send(batch).is_err() {
                     return;
                 }
             }
@@ -210,6 +243,6 @@ impl Batches for ValidationBatches {
         let start = step as usize * VALIDATION_BATCH;
         let end = (start + VALIDATION_BATCH).min(self.positions.len());
         let positions = self.positions[start.min(end)..end].to_vec();
-        self.groups.batch(&positions, &self.device)
+        self.groups.batch(&positions, &|_row| Disturbance::none(), &self.device)
     }
 }

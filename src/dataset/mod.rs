@@ -7,7 +7,8 @@
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
 //! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, summary, inspect
-//! open (which frames train, which judge) -> order -> sample -> batch, by loader
+//! open (which frames train, which judge; traits: what kind of moment each is)
+//!   -> balance -> order -> sample -> augment -> batch, by loader
 //! ```
 
 pub mod ego;
@@ -31,6 +32,7 @@ pub mod clocks;
 pub mod senses;
 pub mod drive;
 pub mod columns;
+pub mod traits;
 pub mod shard;
 pub mod split;
 pub mod account;
@@ -49,8 +51,11 @@ pub mod ingest;
 pub mod publish;
 pub mod inspect;
 pub mod open;
+pub mod balance;
 pub mod order;
 pub mod sample;
+#[cfg(feature = "learning")]
+pub mod augment;
 #[cfg(feature = "learning")]
 pub mod batch;
 #[cfg(feature = "learning")]

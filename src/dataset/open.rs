@@ -7,6 +7,7 @@ use crate::{
         manifest::{LogRecord, Manifest},
         shard::{RowTick, ShardReader, ShardRecord},
         split::Split,
+        traits::Traits,
     },
     error::Result,
     frame::{FUTURE_STEPS, Frame},
@@ -46,6 +47,7 @@ pub struct Row {
     /// Steps of future before the driving is disturbed on purpose: what comes after is not what
     /// the driver wanted.
     pub undisturbed_steps: u8,
+    pub traits: Traits,
 }
 
 /// The frames of one side.
@@ -215,6 +217,7 @@ impl Dataset {
                     let rows = rows.map(|(index, tick)| Row {
                         index,
                         undisturbed_steps: steps_until(&perturbed, tick.index),
+                        traits: tick.traits,
                     });
                     let rows: Vec<Row> = rows.collect();
                     if !rows.is_empty() {

@@ -2,7 +2,8 @@
 //!
 //! This is the costly half of making a batch. It works on one frame and knows no tensors, so a
 //! loader can do it on any thread and keep the result; stacking is the cheap half. Pictures stay
-//! in the precision they were recorded in (8 and 16 bits): a sample of 32 x 80 is 28 kB.
+//! in the precision they were recorded in (8 and 16 bits), lidar and radar as the pixels that have
+//! returns: a sample of 600 x 250 is half a megabyte.
 //! Nothing is normalised here, see [`batch`](crate::dataset::batch).
 
 use half::f16;
@@ -30,9 +31,10 @@ pub struct Sample {
     pub size: Option<InputSize>,
     /// `[H, W, 3]` RGB, 0 ... 255; empty without a size.
     pub camera: Vec<u8>,
-    /// `[H, W, 4]`: x, y, z in metres (optical frame), relative speed in m/s, 0 = no return; empty
-    /// without a size.
-    pub ralidar: Vec<f16>,
+    /// Where there is a return, row x W + column, each once; empty without a size.
+    pub ralidar_pixel: Vec<u32>,
+    /// What is there: x, y, z in metres (optical frame), relative speed in m/s, 0 = no return.
+    pub ralidar: Vec<[f16; 4]>,
     /// Which sensors delivered: camera, ralidar.
     pub present: [bool; 2],
     /// (vx, vy), ego frame.
@@ -65,7 +67,7 @@ impl Sample {
     /// return lies outside of the picture.
     pub fn new(frame: &Frame, size: Option<InputSize>) -> Result<Self> {
         let wrong = |what: String| Error::Picture { frame: frame.index, what };
-        let (mut camera, mut ralidar) = (Vec::new(), Vec::new());
+        let (mut camera, mut ralidar) = (Vec::new(), Returns::default());
         if let Some(size) = size {
             let stored = if frame.image.is_empty() {
                 camera = vec![0; 3 * size.height * size.width];
@@ -76,13 +78,14 @@ impl Sample {
                 camera = shrunk.map_err(wrong)?.into_owned().data;
                 InputSize { height: stored.height, width: stored.width }
             };
-            ralidar = scatter(frame, stored, size).map_err(wrong)?;
+            ralidar = Returns::shrunk(frame, stored, size).map_err(wrong)?;
         }
         let future = &frame.future;
         Ok(Self {
             size,
             camera,
-            ralidar,
+            ralidar_pixel: ralidar.pixel,
+            ralidar: ralidar.values,
             present: [!frame.image.is_empty(), frame.lidar.is_some() || frame.radar.is_some()],
             velocity_mps: frame.velocity_mps,
             route_m: frame.route.waypoints_m,
@@ -94,39 +97,58 @@ impl Sample {
     }
 }
 
-/// Lidar and radar returns of the stored picture on the pixels of the shrunk one: `[H, W, 4]`.
-fn scatter(frame: &Frame, from: InputSize, to: InputSize) -> Result<Vec<f16>, String> {
-    let area = to.height * to.width;
-    let mut out = vec![f16::ZERO; 4 * area];
-    let target = |pixel: u32, sensor: &str| {
-        let (row, column) = (pixel as usize / from.width, pixel as usize % from.width);
-        if row >= from.height {
-            let InputSize { height, width } = from;
-            return Err(format!("{sensor} pixel {pixel} is outside of {width} x {height}"));
-        }
-        Ok(row * to.height / from.height * to.width + column * to.width / from.width)
-    };
-    if let Some(lidar) = &frame.lidar {
-        let mut nearest = vec![f16::INFINITY; area];
-        let xyz = lidar.x.iter().zip(&lidar.y).zip(&lidar.z);
-        for (&pixel, ((&x, &y), &z)) in lidar.pixel.iter().zip(xyz) {
-            let at = target(pixel, "lidar")?;
-            if z < nearest[at] {
-                nearest[at] = z;
-                out[4 * at..4 * at + 3].copy_from_slice(&[x, y, z]);
+/// Returns by pixel, in the order in which they were met.
+#[derive(Default)]
+struct Returns {
+    pixel: Vec<u32>,
+    values: Vec<[f16; 4]>,
+}
+
+impl Returns {
+    /// Lidar and radar returns of the stored picture on the pixels of the shrunk one.
+    fn shrunk(frame: &Frame, from: InputSize, to: InputSize) -> Result<Self, String> {
+        let target = |pixel: u32, sensor: &str| {
+            let (row, column) = (pixel as usize / from.width, pixel as usize % from.width);
+            if row >= from.height {
+                let InputSize { height, width } = from;
+                return Err(format!("{sensor} pixel {pixel} is outside of {width} x {height}"));
+            }
+            Ok(row * to.height / from.height * to.width + column * to.width / from.width)
+        };
+        let mut returns = Returns::default();
+        // Where the returns of a pixel are, from 1; 0 where it has none yet.
+        let mut place = vec![0u32; to.height * to.width];
+        if let Some(lidar) = &frame.lidar {
+            let xyz = lidar.x.iter().zip(&lidar.y).zip(&lidar.z);
+            for (&pixel, ((&x, &y), &z)) in lidar.pixel.iter().zip(xyz) {
+                let at = target(pixel, "lidar")?;
+                let is_new = place[at] == 0;
+                let value = returns.at(at, &mut place);
+                if is_new || z < value[2] {
+                    [value[0], value[1], value[2]] = [x, y, z];
+                }
             }
         }
-    }
-    // Returns of a radar without speeds have nothing to say in the channel of speeds.
-    if let Some(radar) = &frame.radar
-        && let Some(speeds) = &radar.speed_mps
-    {
-        for (&pixel, &speed) in radar.pixel.iter().zip(speeds) {
-            let at = 4 * target(pixel, "radar")? + 3;
-            if speed.to_f32().abs() > out[at].to_f32().abs() {
-                out[at] = speed;
+        // Returns of a radar without speeds have nothing to say in the channel of speeds.
+        if let Some(radar) = &frame.radar
+            && let Some(speeds) = &radar.speed_mps
+        {
+            for (&pixel, &speed) in radar.pixel.iter().zip(speeds) {
+                let value = returns.at(target(pixel, "radar")?, &mut place);
+                if speed.to_f32().abs() > value[3].to_f32().abs() {
+                    value[3] = speed;
+                }
             }
         }
+        Ok(returns)
     }
-    Ok(out)
+
+    fn at(&mut self, pixel: usize, place: &mut [u32]) -> &mut [f16; 4] {
+        if place[pixel] == 0 {
+            self.pixel.push(pixel as u32);
+            self.values.push([f16::ZERO; 4]);
+            place[pixel] = self.values.len() as u32;
+        }
+        &mut self.values[place[pixel] as usize - 1]
+    }
 }

@@ -6,10 +6,7 @@
 
 use std::{fs::File, ops::Range, path::Path};
 
-use arrow::{
-    array::{AsArray, RecordBatch},
-    datatypes::UInt32Type,
-};
+use arrow::array::RecordBatch;
 use parquet::{
     arrow::{
         ArrowWriter, ProjectionMask,
@@ -24,7 +21,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     atomic::{AtomicFile, Committed},
-    dataset::columns::{self, SCHEMA_VERSION, VERSION_KEY},
+    dataset::{
+        columns::{self, Columns, SCHEMA_VERSION, VERSION_KEY},
+        traits::Traits,
+    },
     error::{Error, Result},
     frame::Frame,
 };
@@ -138,19 +138,32 @@ pub fn properties() -> WriterProperties {
     properties.build()
 }
 
-/// Where on the grid a row is.
+/// Where on the grid a row is, and what kind of moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowTick {
     pub index: u32,
     pub perturbed: bool,
+    pub traits: Traits,
 }
 
+/// The columns that a [`RowTick`] is of.
+const TICK_COLUMNS: [&str; 7] =
+    ["frame", "perturbed", "steer", "throttle", "brake", "command", "velocity"];
+
 fn row_ticks(batch: &RecordBatch) -> Result<Vec<RowTick>, String> {
-    let index = batch.column_by_name("frame").and_then(|c| c.as_primitive_opt::<UInt32Type>());
-    let perturbed = batch.column_by_name("perturbed").and_then(|c| c.as_boolean_opt());
-    let (index, perturbed) = index.zip(perturbed).ok_or("`frame` or `perturbed` is missing")?;
-    let rows = index.values().iter().zip(perturbed.values());
-    Ok(rows.map(|(index, perturbed)| RowTick { index: *index, perturbed }).collect())
+    let columns = Columns::of(batch);
+    let tick = |row: usize| {
+        Ok(RowTick {
+            index: columns.index(row)?,
+            perturbed: columns.perturbed(row)?,
+            traits: Traits::new(
+                columns.action(row)?,
+                columns.command(row)?,
+                columns.velocity_mps(row)?,
+            ),
+        })
+    };
+    (0..batch.num_rows()).map(tick).collect()
 }
 
 /// A shard to read from.
@@ -205,7 +218,7 @@ impl ShardReader {
     /// [`Error::Parquet`] if the shard is damaged.
     pub fn ticks(&self) -> Result<Vec<Vec<RowTick>>> {
         let schema = self.metadata.parquet_schema();
-        let columns = ProjectionMask::columns(schema, ["frame", "perturbed"]);
+        let columns = ProjectionMask::columns(schema, TICK_COLUMNS);
         let groups = 0..self.groups.len();
         groups.map(|group| self.read(group, columns.clone(), &row_ticks)).collect()
     }

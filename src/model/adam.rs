@@ -2,17 +2,17 @@
 //!
 //! candle's own hides its moments, so a resumed run would not be the run that was stopped.
 
-use std::{
-    cell::RefCell,
-    collections::{BTreeMap, HashMap},
-};
+use std::collections::{BTreeMap, HashMap};
 
-use candle_core::{CpuStorage, Device, InplaceOp2, Layout, Storage, Tensor, Var};
-use pmp_kernels::adam::{Step, sum_of_squares};
+use candle_core::{Device, Tensor, Var};
 
 use crate::{
     error::{Error, Result},
-    model::{gradient::Gradient, init::Weights},
+    model::{
+        gradient::Gradient,
+        init::Weights,
+        ops::adam::{Moments, Step, adam_step, sum_of_squares},
+    },
 };
 
 /// AdamW (Loshchilov & Hutter, 2019, arXiv:1711.05101) as PyTorch has it, with clipping of the
@@ -28,16 +28,15 @@ pub struct Adam {
 struct Slot {
     name: String,
     var: Var,
-    first: Vec<f32>,
-    second: Vec<f32>,
+    moments: Moments,
 }
 
 impl Adam {
     /// No step taken, moments 0.
     pub fn new(weights: &Weights, weight_decay: f64) -> Self {
         let slot = |(name, var): (&str, &Var)| {
-            let zeros = || vec![0.0; var.elem_count()];
-            Slot { name: name.into(), var: var.clone(), first: zeros(), second: zeros() }
+            let moments = Moments::zeros(var.elem_count());
+            Slot { name: name.into(), var: var.clone(), moments }
         };
         Self { slots: weights.parameters().map(slot).collect(), steps: 0, weight_decay }
     }
@@ -59,7 +58,7 @@ impl Adam {
         let mut squares = 0.0;
         for slot in &self.slots {
             let Some(grad) = gradient.get(&slot.name) else { continue };
-            let its = sum_over(grad)?;
+            let its = sum_of_squares(grad)?;
             if !its.is_finite() {
                 let term = format!("gradient of {}", slot.name);
                 return Err(Error::Diverged { step: self.steps + 1, term, frames: vec![] });
@@ -76,8 +75,7 @@ impl Adam {
             Step { number, lr, weight_decay, decoupled: true, grad_scale, ..Step::default() };
         for slot in &mut self.slots {
             let Some(grad) = gradient.get(&slot.name) else { continue };
-            let moments = RefCell::new((&mut slot.first[..], &mut slot.second[..]));
-            slot.var.inplace_op2(&grad.contiguous()?, &Move { step, moments })?;
+            adam_step(&slot.var, grad, &mut slot.moments, &step)?;
         }
         Ok(norm)
     }
@@ -90,7 +88,8 @@ impl Adam {
     pub fn moments(&self) -> Result<BTreeMap<String, Tensor>> {
         let mut moments = BTreeMap::new();
         for slot in &self.slots {
-            for (which, values) in [("first", &slot.first), ("second", &slot.second)] {
+            let Moments { first, second } = &slot.moments;
+            for (which, values) in [("first", first), ("second", second)] {
                 let tensor = Tensor::from_slice(values, slot.var.shape(), &Device::Cpu)?;
                 moments.insert(format!("{which}.{}", slot.name), tensor);
             }
@@ -112,53 +111,9 @@ impl Adam {
                     _ => Err(candle_core::Error::msg(format!("no moment {name} that fits"))),
                 }
             };
-            (slot.first, slot.second) = (moment("first")?, moment("second")?);
+            slot.moments = Moments { first: moment("first")?, second: moment("second")? };
         }
         self.steps = steps;
         Ok(())
-    }
-}
-
-/// One parameter's share of a step, in place.
-struct Move<'m> {
-    step: Step,
-    /// First and second; candle hands out a shared reference to the operation.
-    moments: RefCell<(&'m mut [f32], &'m mut [f32])>,
-}
-
-impl InplaceOp2 for Move<'_> {
-    fn name(&self) -> &'static str {
-        "adam"
-    }
-
-    fn cpu_fwd(
-        &self,
-        weights: &mut CpuStorage,
-        at: &Layout,
-        grad: &CpuStorage,
-        grad_at: &Layout,
-    ) -> candle_core::Result<()> {
-        let (Some(at), Some(grad_at)) = (at.contiguous_offsets(), grad_at.contiguous_offsets())
-        else {
-            candle_core::bail!("adam: weights and gradients have to be contiguous")
-        };
-        let (CpuStorage::F32(weights), CpuStorage::F32(grad)) = (weights, grad) else {
-            candle_core::bail!("adam: weights and gradients have to be f32")
-        };
-        let (first, second) = &mut *self.moments.borrow_mut();
-        self.step.take(&mut weights[at.0..at.1], &grad[grad_at.0..grad_at.1], first, second);
-        Ok(())
-    }
-}
-
-/// The sum of the squares of a gradient on the CPU.
-fn sum_over(grad: &Tensor) -> Result<f64> {
-    let grad = grad.contiguous()?;
-    let (storage, layout) = grad.storage_and_layout();
-    match (&*storage, layout.contiguous_offsets()) {
-        (Storage::Cpu(CpuStorage::F32(numbers)), Some((from, to))) => {
-            Ok(sum_of_squares(&numbers[from..to]))
-        }
-        _ => Err(candle_core::Error::msg("adam: gradients have to be f32 on the CPU").into()),
     }
 }

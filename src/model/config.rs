@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    dataset::loader::SamplingConfig,
     error::{Error, Result},
     model::net_config::{Model, NetConfig, Preset},
 };
@@ -47,6 +48,7 @@ pub struct TrainConfig {
     /// themselves.
     pub ema: f64,
     pub loss: LossConfig,
+    pub sampling: SamplingConfig,
     /// Seeds the weights, the order of frames, what is dropped and what is disturbed; nothing
     /// else is random.
     pub seed: u64,
@@ -146,6 +148,7 @@ impl TrainConfig {
                 entropy_weight: 0.0,
                 speed_weight: 0.05,
             },
+            sampling: SamplingConfig::default(),
             seed: 0,
             log_every: 50,
             eval_every: 500,
@@ -266,6 +269,18 @@ impl TrainConfig {
             ("loss.speed_weight", loss.speed_weight),
         ] {
             need(at_least_0(weight), key, "must be 0 or more")?;
+        }
+        let (balance, augment) = (self.sampling.balance, &self.sampling.augment);
+        need((0.0..=1.0).contains(&balance), "sampling.balance", "must be in 0 ... 1")?;
+        for (key, share) in [
+            ("sampling.augment.brightness", augment.brightness),
+            ("sampling.augment.contrast", augment.contrast),
+            ("sampling.augment.colour", augment.colour),
+            ("sampling.augment.point_dropout", augment.point_dropout),
+            ("sampling.augment.camera_dropout", augment.camera_dropout),
+            ("sampling.augment.ralidar_dropout", augment.ralidar_dropout),
+        ] {
+            need((0.0..1.0).contains(&share), key, "must be 0 or more and below 1")?;
         }
         for (key, every) in [
             ("log_every", self.log_every),

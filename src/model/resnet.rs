@@ -11,9 +11,7 @@ use candle_nn::{
     VarBuilder,
     init::{NonLinearity, ONE, ZERO},
 };
-use pmp_kernels::{
-    resnet::{self, Mode, Network, Weights},
-};
+use pmp_kernels::resnet::{self, Mode, Network, Weights};
 
 use crate::{
     error::Result,

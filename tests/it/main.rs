@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod architecture;
+#[cfg(feature = "learning")]
+mod augment;
 mod schemas;
 mod definitions;
 mod fixtures;
@@ -57,8 +59,11 @@ mod training;
 mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
+mod sampling;
 mod world;
 mod encoding;
+#[cfg(feature = "learning")]
+mod torch_networks;
 mod towns;
 mod scenery;
 mod scene;

@@ -25,7 +25,10 @@ const LEARN: Pass = Pass::Learn { seed: 0, step: 0, part: 0 };
 fn numbers(seed: u32, shape: &[usize]) -> Tensor {
     let wild = |i: usize| (i as u32 ^ seed).wrapping_mul(2_654_435_761).rotate_left(13);
     let number = |i: usize| wild(i).wrapping_mul(2_246_822_519) as f32 / 2_147_483_648.0 - 1.0;
-    Tensor::from_iter((0..shape.iter().product()).map(number), &Cpu).unwrap().reshape(shape).unwrap()
+    Tensor::from_iter((0..shape.iter().product()).map(number), &Cpu)
+        .unwrap()
+        .reshape(shape)
+        .unwrap()
 }
 
 /// Largest difference as a share of the largest number.
@@ -79,8 +82,8 @@ fn convolution_of_another_type_is_candles() {
 fn batch_norm_and_its_gradients_are_pytorchs() {
     for (name, training) in [("norm_train", true), ("norm_eval", false)] {
         let file = pytorch(name);
-        let [x, scale, shift, residual] = ["x", "weight", "bias", "residual"]
-            .map(|name| Var::from_tensor(&file[name]).unwrap());
+        let [x, scale, shift, residual] =
+            ["x", "weight", "bias", "residual"].map(|name| Var::from_tensor(&file[name]).unwrap());
         let list = |name: &str| file[name].to_vec1::<f32>().unwrap();
         let kept = pmp_kernels::norm::Moments { mean: list("mean"), variance: list("var") };
         let norm = Norm { moments: (!training).then_some(kept), eps: 1e-5, relu: true };
@@ -130,7 +133,8 @@ fn adam_on_variables_is_pytorchs() {
     for i in 0..10 {
         let (grad, want) = (file["grads"].get(i).unwrap(), file["steps"].get(i).unwrap());
         let [lr, weight_decay] = [0.01, 0.1];
-        let step = Step { number: i as u64 + 1, lr, weight_decay, decoupled: true, ..Step::default() };
+        let step =
+            Step { number: i as u64 + 1, lr, weight_decay, decoupled: true, ..Step::default() };
         adam_step(&var, &grad, &mut moments, &step).unwrap();
         assert!(off(&var, &want) < 1e-6);
         let squares = grad.sqr().unwrap().sum_all().unwrap().to_scalar::<f32>().unwrap();

@@ -4,7 +4,8 @@ use candle_core::Device::Cpu;
 use half::f16;
 use pmp::{
     dataset::{
-        batch::Batch,
+        augment::Disturbance,
+        batch::{Batch, Inputs},
         sample::{InputSize, Sample},
     },
     frame::{
@@ -80,7 +81,8 @@ fn nearest_lidar_return_and_fastest_radar_return_win_a_pixel() {
         Some(RadarPixels { pixel: vec![0, 1, 2], speed_mps: Some(halves(&[2.0, -6.0, 5.0])) });
     let sample = Sample::new(&frame, SIZE).unwrap();
     let pixel = |at: usize| -> Vec<f32> {
-        (0..4).map(|channel| sample.ralidar[4 * at + channel].to_f32()).collect()
+        let place = sample.ralidar_pixel.iter().position(|pixel| *pixel == at as u32);
+        place.map_or(vec![0.0; 4], |place| sample.ralidar[place].map(f32::from).to_vec())
     };
     assert_eq!(pixel(0), [2.0, -2.0, 10.0, -6.0]);
     assert_eq!(pixel(1), [0.0; 4]);
@@ -93,7 +95,7 @@ fn batch_carries_labels_with_masks_and_sensors_with_presence() {
     (blind.image, blind.lidar, blind.perturbed) = (vec![], None, true);
     let samples = [Sample::new(&frame(), SIZE).unwrap(), Sample::new(&blind, SIZE).unwrap()];
     let names = vec!["a/7".to_string(), "b/8".to_string()];
-    let batch = Batch::stack(&samples, names, &Cpu).unwrap();
+    let batch = Batch::stack(&samples, names, &|_| Disturbance::none(), &Cpu).unwrap();
     let second = &batch.split(2).unwrap()[1];
     assert_eq!((second.len().unwrap(), &second.frames[..]), (1, &["b/8".to_string()][..]));
     let Batch { inputs, targets, .. } = batch;
@@ -121,7 +123,7 @@ fn network_without_pictures_does_not_decode_them() {
     broken.image = vec![1, 2, 3];
     let sample = Sample::new(&broken, None).unwrap();
     assert!(sample.camera.is_empty() && sample.ralidar.is_empty());
-    assert!(Batch::stack(&[sample], vec![], &Cpu).unwrap().inputs.camera.is_none());
+    assert!(Inputs::stack(&[sample], &Cpu).unwrap().camera.is_none());
 }
 
 #[test]

@@ -86,7 +86,11 @@ pub(crate) fn open_data(path: &Path, config: &TrainConfig, device: &Device) -> R
     let dataset = Arc::new(Dataset::open(path)?);
     let size = config.net.input_size();
     let (batch_size, seed) = (config.batch_size, config.seed);
-    let train = TrainBatches::new(dataset.clone(), size, batch_size, seed, device)?;
+    let sampling = &config.sampling;
+    let train = TrainBatches::new(dataset.clone(), size, batch_size, seed, sampling, device)?;
+    if sampling.balance > 0.0 {
+        eprint!("{}", train.balance.table());
+    }
     let validation = ValidationBatches::new(dataset.clone(), size, device);
     Ok(Data {
         validation_batches: validation.count().min(config.eval_batches),

@@ -7,7 +7,7 @@ use candle_core::{CpuStorage, CustomOp1, CustomOp2, CustomOp3, Layout, Shape, Te
 use crate::error::Result;
 
 /// The gradient of a result to those of the arguments, `None` where an argument needs none.
-pub type Back = Box<dyn Fn(&Tensor) -> Result<Vec<Option<Tensor>>> + Send + Sync>;
+pub(super) type Back = Box<dyn Fn(&Tensor) -> Result<Vec<Option<Tensor>>> + Send + Sync>;
 
 /// A tensor of these numbers, which depends on up to three arguments by `back`.
 ///
