@@ -6,6 +6,7 @@ process, and prints medians and ratios as a Markdown table. Needs torch and safe
 """
 import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -152,12 +153,10 @@ def measure(folder, mode, layout, threads, warm, steps):
         optimizer.step()
         return loss.item()
 
-    losses, times = [], []
-    for _ in range(warm + steps):
-        clock, used = time.perf_counter(), time.process_time()
-        losses.append(step())
-        times.append((time.process_time() - used, time.perf_counter() - clock))
-    cpu, wall = (statistics.median(column) for column in zip(*times[warm:]))
+    losses = [step() for _ in range(warm)]
+    clock, used = time.perf_counter(), time.process_time()
+    losses += [step() for _ in range(steps)]
+    cpu, wall = (time.process_time() - used) / steps, (time.perf_counter() - clock) / steps
     print(json.dumps({"cpu": cpu, "wall": wall, "start": start, "base": base, "peak": peak_mb(), "losses": losses}))
 
 
@@ -190,7 +189,9 @@ def row(options, folder, size, what, mode, threads, notes):
     for turn in range(options.rounds):
         order = list(commands)[turn % 3:] + list(commands)[:turn % 3]
         for name in order:
-            output = subprocess.run(commands[name], check=True, capture_output=True, text=True).stdout
+            environment = os.environ | {"CANDLE_NUM_THREADS": str(threads)}
+            output = subprocess.run(
+                commands[name], check=True, capture_output=True, text=True, env=environment).stdout
             runs[name].append(json.loads(output.splitlines()[-1]))
     # Memory over what the process has before it has a network: the interpreter and its packages.
     for results in runs.values():
@@ -202,7 +203,7 @@ def row(options, folder, size, what, mode, threads, notes):
         return statistics.median(result[key] for result in runs[name])
 
     def ratio(key):
-        of = (statistics.median(ours[key] / theirs[key] for ours, theirs in zip(runs["ours"], runs[name]))
+        of = (statistics.median(ours[key] / max(theirs[key], 1e-9) for ours, theirs in zip(runs["ours"], runs[name]))
               for name in ("first", "last"))
         return " / ".join(f"{x:.2f}" for x in of)
 

@@ -2,14 +2,19 @@
 //! [`Shape::method`] is chosen by. `layers [full|mid|tiny] [rounds]`, on one thread.
 #![allow(clippy::print_stdout)]
 
-use std::time::Instant;
-
 use pmp_kernels::conv::{self, Method, Shape};
+
+/// CPU time of this thread, which other programs do not lengthen.
+fn cpu_ms() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
+    let nanos = text.split(' ').next().and_then(|nanos| nanos.parse::<f64>().ok());
+    nanos.expect("nanoseconds come first") / 1e6
+}
 
 fn main() {
     let mut args = std::env::args().skip(1);
     let config = args.next().unwrap_or_else(|| "full".into());
-    let rounds = args.next().and_then(|n| n.parse().ok()).unwrap_or(5);
+    let rounds: u32 = args.next().and_then(|n| n.parse().ok()).unwrap_or(20);
     let (batch, height, width, channels) = match config.as_str() {
         "tiny" => (16, 64, 160, 16),
         "mid" => (8, 88, 200, 64),
@@ -37,7 +42,11 @@ fn main() {
         }
         layers.push((2 * blocks - usize::from(i > 0), of(h, w, c, c, 3, 1)));
     }
-    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("no other pool yet");
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .use_current_thread()
+        .build_global()
+        .expect("no other pool yet");
     println!("ms of a layer: forward, gradient of the input, of the weight; * chosen");
     for (count, s) in layers {
         let flops = 2.0 * (s.output_len() * s.channels * s.kernel[0] * s.kernel[1]) as f64;
@@ -60,19 +69,22 @@ fn main() {
             if method != Method::Direct && (s.kernel != [3, 3] || s.stride != [1, 1]) {
                 continue;
             }
-            let mut times = [f64::MAX; 3];
-            for _ in 0..rounds {
-                let start = Instant::now();
-                conv::forward_by(method, &s, (&x[..]).into(), &weight, None, &mut out);
-                let forward = Instant::now();
-                conv::backward_input_by(method, &s, &out, &weight, &mut grad_x);
-                let input = Instant::now();
-                conv::backward_weight_by(method, &s, (&x[..]).into(), &out, &mut grad_weight);
-                let took = [forward - start, input - forward, input.elapsed()];
-                for (time, took) in times.iter_mut().zip(took) {
-                    *time = time.min(1e3 * took.as_secs_f64());
-                }
-            }
+            // The clock ticks every few milliseconds: many calls between two looks at it.
+            let each = |call: &mut dyn FnMut()| {
+                call();
+                let start = cpu_ms();
+                (0..rounds).for_each(|_| call());
+                (cpu_ms() - start) / f64::from(rounds)
+            };
+            let times = [
+                each(&mut || {
+                    conv::forward_by(method, &s, (&x[..]).into(), &weight, None, &mut out);
+                }),
+                each(&mut || conv::backward_input_by(method, &s, &out, &weight, &mut grad_x)),
+                each(&mut || {
+                    conv::backward_weight_by(method, &s, (&x[..]).into(), &out, &mut grad_weight);
+                }),
+            ];
             let chosen = if s.method() == method { '*' } else { ' ' };
             let [a, b, c] = times;
             print!("  {method:?}{chosen} {a:6.2} {b:6.2} {c:6.2}");

@@ -1,7 +1,7 @@
 //! What trains a convolutional network on the CPU: slices in, slices out.
 //!
 //! ```text
-//! buffers, pieces, simd, product
+//! buffers, pieces, simd, matrix products
 //!   -> conv    forward, gradients of input, weight and bias
 //!   -> norm    batch norm with residual addition and ReLU, both passes
 //!   -> pooling maximum and mean
@@ -18,10 +18,10 @@
 //!
 //! Slices of a wrong length are bugs of the caller: all functions panic on them.
 
+mod foreign;
 pub mod buffers;
 mod pieces;
 mod simd;
-mod product;
 pub mod conv;
 pub mod norm;
 pub mod pooling;

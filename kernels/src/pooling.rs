@@ -1,8 +1,13 @@
 //! The maximum of windows and the mean of pictures.
 
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::{conv::Input, norm::Affine, simd::widest};
+use crate::{
+    conv::Input,
+    norm::Affine,
+    simd::{load, store, widest},
+};
 
 /// Sizes of a pooling by maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,45 +76,69 @@ pub fn max<'a>(shape: &Shape, x: impl Into<Input<'a>>, out: &mut [f32], which: &
     let ([height, width], c) = (shape.out(), shape.channels);
     let rows = out.par_chunks_mut(width * c).zip(which.par_chunks_mut(width * c));
     rows.enumerate().for_each(|(row, (out, which))| {
-        let (image, top) = (row / height, row % height * shape.stride[0]);
-        let pixels = out.chunks_exact_mut(c).zip(which.chunks_exact_mut(c));
-        for (column, (out, which)) in pixels.enumerate() {
-            let left = column * shape.stride[1];
-            let mut first = true;
-            for tap in 0..shape.kernel[0] * shape.kernel[1] {
-                let y = (top + tap / shape.kernel[1]).checked_sub(shape.padding[0]);
-                let x_at = (left + tap % shape.kernel[1]).checked_sub(shape.padding[1]);
-                let (Some(y), Some(x_at)) = (y, x_at) else { continue };
-                if y >= shape.height || x_at >= shape.width {
-                    continue;
-                }
-                let pixel = &x[((image * shape.height + y) * shape.width + x_at) * c..][..c];
-                widest(|| match affine {
-                    None => larger(pixel.iter().copied(), tap as u8, first, out, which),
-                    Some(Affine { scale, shift }) => {
-                        let lines = pixel.iter().zip(scale).zip(shift);
-                        let relu = lines.map(|((x, a), b)| x.mul_add(*a, *b).max(0.0));
-                        larger(relu, tap as u8, first, out, which);
-                    }
-                });
-                first = false;
-            }
-        }
+        widest(Row { shape, x, affine, image: row / height, row: row % height, out, which });
     });
 }
 
-#[inline(always)]
-fn larger(
-    pixel: impl Iterator<Item = f32>,
-    tap: u8,
-    first: bool,
-    out: &mut [f32],
-    which: &mut [u8],
-) {
-    for ((x, out), which) in pixel.zip(out).zip(which) {
-        let take = first | (x > *out) | x.is_nan();
-        *which = if take { tap } else { *which };
-        *out = if take { x } else { *out };
+/// A row of maxima.
+struct Row<'a> {
+    shape: &'a Shape,
+    x: &'a [f32],
+    affine: Option<Affine<'a>>,
+    image: usize,
+    row: usize,
+    out: &'a mut [f32],
+    which: &'a mut [u8],
+}
+
+impl WithSimd for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { shape, x, affine, image, row, out, which } = self;
+        let c = shape.channels;
+        let inside = |at: usize, i: usize, side: usize| {
+            let first = at * shape.stride[i];
+            let from = shape.padding[i].saturating_sub(first);
+            from..(side + shape.padding[i] - first).min(shape.kernel[i])
+        };
+        let ys = inside(row, 0, shape.height);
+        for (column, out) in out.chunks_exact_mut(c).enumerate() {
+            let xs = inside(column, 1, shape.width);
+            let y = image * shape.height + row * shape.stride[0] + ys.start - shape.padding[0];
+            let left = column * shape.stride[1] + xs.start - shape.padding[1];
+            for channel in (0..c).step_by(S::F32_LANES) {
+                let mut most = simd.splat_f32s(f32::NEG_INFINITY);
+                let mut from = simd.splat_u32s((ys.start * shape.kernel[1] + xs.start) as u32);
+                for (down, tap_y) in ys.clone().enumerate() {
+                    for (right, tap_x) in xs.clone().enumerate() {
+                        let pixel = (y + down) * shape.width + left + right;
+                        let mut value = load(simd, x, pixel * c + channel);
+                        if let Some(Affine { scale, shift }) = affine {
+                            let (scale, shift) =
+                                (load(simd, scale, channel), load(simd, shift, channel));
+                            value = simd.mul_add_f32s(value, scale, shift);
+                            value = simd.max_f32s(value, simd.splat_f32s(0.0));
+                        }
+                        let tap = simd.splat_u32s((tap_y * shape.kernel[1] + tap_x) as u32);
+                        // Larger, or not a number.
+                        let kept = simd.less_than_or_equal_f32s(value, most);
+                        let broken = simd.not_m32s(simd.equal_f32s(most, most));
+                        let kept = simd.or_m32s(kept, broken);
+                        most = simd.select_f32s(kept, most, value);
+                        from = simd.select_u32s(kept, from, tap);
+                    }
+                }
+                store(simd, out, channel, most);
+                let from = [from];
+                let from: &[u32] = pulp::bytemuck::cast_slice(&from);
+                let which = &mut which[column * c + channel..(column + 1) * c];
+                for (which, from) in which.iter_mut().zip(from) {
+                    *which = *from as u8;
+                }
+            }
+        }
     }
 }
 
@@ -139,16 +168,31 @@ pub fn backward_max(shape: &Shape, grad_out: &[f32], which: &[u8], grad_x: &mut 
                 for (across, tap_x) in windows(x, 1, width) {
                     let tap = (tap_y * shape.kernel[1] + tap_x) as u8;
                     let at = ((image * height + down) * width + across) * c;
-                    let window = grad_out[at..][..c].iter().zip(&which[at..][..c]);
-                    widest(|| {
-                        for (grad_x, (grad, which)) in grad_x.iter_mut().zip(window) {
-                            *grad_x += if *which == tap { *grad } else { 0.0 };
-                        }
-                    });
+                    let (grad, which) = (&grad_out[at..][..c], &which[at..][..c]);
+                    widest(Hand { tap, which, grad, grad_x });
                 }
             }
         }
     });
+}
+
+/// Adds the gradients of a window to the pixel that they come from.
+struct Hand<'a> {
+    tap: u8,
+    which: &'a [u8],
+    grad: &'a [f32],
+    grad_x: &'a mut [f32],
+}
+
+impl WithSimd for Hand<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for ((grad_x, grad), which) in self.grad_x.iter_mut().zip(self.grad).zip(self.which) {
+            *grad_x += if *which == self.tap { *grad } else { 0.0 };
+        }
+    }
 }
 
 /// The mean of each picture: `[B, pixels, C]` to `[B, C]`.
@@ -161,11 +205,9 @@ pub fn mean(pixels: usize, channels: usize, x: &[f32], out: &mut [f32]) {
     let images = out.par_chunks_exact_mut(channels).zip(x.par_chunks_exact(pixels * channels));
     images.for_each(|(out, x)| {
         out.fill(0.0);
-        widest(|| {
-            for pixel in x.chunks_exact(channels) {
-                out.iter_mut().zip(pixel).for_each(|(sum, x)| *sum += x);
-            }
-        });
+        for pixel in x.chunks_exact(channels) {
+            out.iter_mut().zip(pixel).for_each(|(sum, x)| *sum += x);
+        }
         out.iter_mut().for_each(|sum| *sum /= pixels as f32);
     });
 }

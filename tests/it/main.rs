@@ -71,6 +71,8 @@ mod scene;
 mod flow;
 mod recording;
 mod one_pixel;
+#[cfg(feature = "learning")]
+mod operations;
 mod replay;
 mod ranging;
 mod camera;

@@ -6,19 +6,20 @@
 
 use std::ops::Range;
 
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::{
     buffers::Buffer,
     conv::{Input, Shape},
+    foreign::{Matrix, multiply},
     norm::Affine,
     pieces::{Block, add_up, blocks, shares, split},
-    product::{Matrix, multiply},
-    simd::widest,
+    simd::{load, store, widest},
 };
 
-/// Channels of a result that are computed together, a multiple of what `gemm` takes at once.
-const TOGETHER: usize = 96;
+/// Channels of a result that are computed together, what `gemm` takes at once.
+const TOGETHER: usize = 64;
 
 /// Numbers of a share's rows: half a second-level cache.
 const SHARE: usize = 1 << 17;
@@ -55,14 +56,30 @@ impl Picture<'_> {
             part[to * c..].fill(0.0);
             let inside = &mut part[from * c..to * c];
             inside.copy_from_slice(&self.input.x[first..][..inside.len()]);
-            if let Some(Affine { scale, shift }) = self.input.affine {
-                widest(|| {
-                    for pixel in inside.chunks_exact_mut(c) {
-                        for ((x, scale), shift) in pixel.iter_mut().zip(scale).zip(shift) {
-                            *x = x.mul_add(*scale, *shift).max(0.0);
-                        }
-                    }
-                });
+            if let Some(map) = self.input.affine {
+                widest(Relu { map, pixels: inside });
+            }
+        }
+    }
+}
+
+/// The ReLU of a map of each channel, in place.
+struct Relu<'a> {
+    map: Affine<'a>,
+    pixels: &'a mut [f32],
+}
+
+impl WithSimd for Relu<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { map: Affine { scale, shift }, pixels } = self;
+        for pixel in pixels.chunks_exact_mut(scale.len()) {
+            for at in (0..pixel.len()).step_by(S::F32_LANES) {
+                let (scale, shift) = (load(simd, scale, at), load(simd, shift, at));
+                let value = simd.mul_add_f32s(load(simd, pixel, at), scale, shift);
+                store(simd, pixel, at, simd.max_f32s(value, simd.splat_f32s(0.0)));
             }
         }
     }
@@ -108,12 +125,9 @@ pub(crate) fn forward(
     if out.is_empty() || depth == 0 {
         return fill_rows(out, o, bias);
     }
-    let weight = pack(o, depth, |channels, packed| {
-        for (o, channel) in channels.clone().enumerate() {
-            for (i, weight) in weight[channel * depth..][..depth].iter().enumerate() {
-                packed[(i % taps * c + i / taps) * channels.len() + o] = *weight;
-            }
-        }
+    let weight = pack(o, depth, |few, packed| {
+        let weight = &weight[few.start * depth..few.end * depth];
+        turn([few.len(), c, taps], |from, to| packed[to] = weight[from]);
     });
     let picture = shape.picture(x);
     let each = (SHARE / depth).clamp(16, 512);
@@ -185,16 +199,18 @@ pub(crate) fn backward_input(shape: &Shape, grad_out: &[f32], weight: &[f32], gr
             let count =
                 [0, 1].map(|i| shape.kernel[i].saturating_sub(first[i]).div_ceil(shape.stride[i]));
             let packed = pack(c, count[0] * count[1] * o, |channels, packed| {
-                for (i, channel) in channels.clone().enumerate() {
+                for o_i in 0..o {
+                    let weight = &weight[(o_i * c + channels.start) * taps..];
                     for y in 0..count[0] {
                         for x in 0..count[1] {
                             // Backwards, so that the pixels gathered lie in their order.
                             let kernel_y = first[0] + down * (count[0] - 1 - y);
                             let kernel_x = first[1] + right * (count[1] - 1 - x);
                             let tap = kernel_y * shape.kernel[1] + kernel_x;
-                            for o_i in 0..o {
-                                let at = ((y * count[1] + x) * o + o_i) * channels.len() + i;
-                                packed[at] = weight[(o_i * c + channel) * taps + tap];
+                            let at = ((y * count[1] + x) * o + o_i) * channels.len();
+                            let row = &mut packed[at..at + channels.len()];
+                            for (i, packed) in row.iter_mut().enumerate() {
+                                *packed = weight[i * taps + tap];
                             }
                         }
                     }
@@ -281,10 +297,21 @@ pub(crate) fn backward_weight(shape: &Shape, x: Input, grad_out: &[f32], grad_we
     together.par_iter().zip(grads).zip(sums).for_each(|((few, grad), parts)| {
         let mut sum = Buffer::any(grad.len());
         add_up(parts, &mut sum);
-        for (o, grad) in grad.chunks_exact_mut(depth).enumerate() {
-            for (i, grad) in grad.iter_mut().enumerate() {
-                *grad = sum[(i % taps * c + i / taps) * few.len() + o];
+        turn([few.len(), c, taps], |to, from| grad[to] = sum[from]);
+    });
+}
+
+/// Calls `pair` with the places of each number in `[few][c][taps]` and in `[taps][c][few]`, a few
+/// rows of both at a time, so that what is touched stays in the cache.
+#[inline(always)]
+fn turn([few, c, taps]: [usize; 3], mut pair: impl FnMut(usize, usize)) {
+    for rows in shares(few, 16) {
+        for channel in 0..c {
+            for tap in 0..taps {
+                for row in rows.clone() {
+                    pair((row * c + channel) * taps + tap, (tap * c + channel) * few + row);
+                }
             }
         }
-    });
+    }
 }

@@ -15,23 +15,29 @@ use rayon::prelude::*;
 use crate::{
     buffers::Buffer,
     conv::{Input, Shape, tile},
+    foreign::{Matrix, multiply},
     norm::Affine,
     pieces::{Block, add_up, blocks, shares, split},
-    product::{Matrix, multiply},
     simd::{load, store, widest},
 };
 
-/// Channels of a result that are multiplied together, a multiple of what `gemm` takes at once.
-const TOGETHER: usize = 96;
+/// Channels of a result that are multiplied together: what `gemm` takes at once.
+const TOGETHER: usize = 64;
 
-/// As [`TOGETHER`], for the weight's gradient and for large weights: `N`^2 planes of them.
-const FEW: usize = 48;
+/// Channels of the input whose factors, `N`^2 planes of them, stay in a second-level cache.
+const CHUNK: usize = 96;
 
 /// Pairs of channels from which on a weight is large.
 const LARGE: usize = 96 * 96;
 
 /// Tiles of a block.
 const TILES: usize = 48;
+
+/// From a plane of `len` numbers to the next: an odd number of cache lines, or all planes would
+/// compete for the same few places of the cache.
+fn stride(len: usize) -> usize {
+    16 * (len.div_ceil(16) | 1)
+}
 
 /// A cut of the results into tiles, and of those into blocks.
 struct Grid {
@@ -75,81 +81,97 @@ pub(crate) fn forward<const N: usize, const M: usize>(
     let grid = Grid::new(shape, M);
     let (c, o) = (shape.channels, shape.out_channels);
     let [height, width] = shape.out();
-    let outs = split(
-        out,
-        grid.blocks.iter().map(|block| {
-            let rows = (block.rows.end * M).min(height) - block.rows.start * M;
-            block.images.len() * rows * width * o
-        }),
-    );
+    let out_len = |block: &Block| {
+        let rows = (block.rows.end * M).min(height) - block.rows.start * M;
+        block.images.len() * rows * width * o
+    };
+    let outs = split(out, grid.blocks.iter().map(out_len));
     let to_tiles = |block: &Block| {
-        let mut planes = Buffer::any(N * N * grid.tiles(block) * c);
+        let mut planes = Buffer::any(N * N * stride(grid.tiles(block) * c));
         let to = &mut planes;
         widest(ToTiles::<N, M> { shape, grid: &grid, x, block, planes: to });
         planes
     };
-    let kernel = |few: Range<usize>, planes: &mut [f32]| {
-        widest(ToFactors::<N> { shape, weight, turned, channels: few, planes });
+    let kernel = |few: &Range<usize>, chunk: Range<usize>, planes: &mut [f32]| {
+        let few = few.clone();
+        widest(ToFactors::<N> { shape, weight, turned, few, chunk, planes });
     };
+    // A plane of a block to products `[tiles][few]`, of a chunk of the input's channels.
+    let pairs = |few: &Range<usize>,
+                 chunk: &Range<usize>,
+                 factors: &[f32],
+                 plane: &[f32],
+                 tiles,
+                 to: &mut [f32]| {
+        let left = Matrix { numbers: factors, down: 1, right: few.len() };
+        let right = Matrix { numbers: &plane[chunk.start..], down: 1, right: c };
+        multiply([few.len(), tiles, chunk.len()], left, right, to, few.len(), chunk.start > 0);
+    };
+    let together = shares(o, TOGETHER);
     if c * o < LARGE {
-        let together = shares(o, TOGETHER);
-        let mut factors = Buffer::any(N * N * c * o);
-        let parts = split(&mut factors, together.iter().map(|few| N * N * c * few.len()));
-        together.par_iter().zip(parts).for_each(|(few, part)| kernel(few.clone(), part));
+        let len = |few: &Range<usize>| N * N * stride(c * few.len());
+        let mut factors = Buffer::any(together.iter().map(len).sum());
+        let mut parts = split(&mut factors, together.iter().map(len));
+        together.par_iter().zip(&mut parts).for_each(|(few, part)| kernel(few, 0..c, part));
+        let factors = parts;
         grid.blocks.par_iter().zip(outs).for_each(|(block, out)| {
             let tiles = grid.tiles(block);
             let planes = to_tiles(block);
-            let mut products = Buffer::any(N * N * tiles * o);
-            for few in &together {
-                let factors = &factors[N * N * c * few.start..];
-                let products = &mut products[N * N * tiles * few.start..];
-                for plane in 0..N * N {
-                    let factors = &factors[plane * c * few.len()..];
-                    let product = &mut products[plane * tiles * few.len()..];
-                    pairs(few.len(), c, tiles, factors, &planes[plane * tiles * c..], product);
+            let len = |few: &Range<usize>| N * N * stride(tiles * few.len());
+            let mut products = Buffer::any(together.iter().map(len).sum());
+            let mut products = split(&mut products, together.iter().map(len));
+            for ((few, factors), products) in together.iter().zip(&factors).zip(&mut products) {
+                for (plane, product) in
+                    products.chunks_exact_mut(stride(tiles * few.len())).enumerate()
+                {
+                    let factors = &factors[plane * stride(c * few.len())..];
+                    let plane = &planes[plane * stride(tiles * c)..];
+                    pairs(few, &(0..c), factors, plane, tiles, product);
                 }
             }
-            let places = Products { numbers: &products, tiles, first: 0, together: &together };
-            widest(FromTiles::<N, M> { shape, grid: &grid, products: places, block, bias, out });
+            for (few, numbers) in together.iter().zip(products) {
+                let products = Products { numbers, tiles, first: 0, few };
+                widest(FromTiles::<N, M> { shape, grid: &grid, products, block, bias, out });
+            }
         });
-    } else {
-        let planes: Vec<Buffer> = grid.blocks.par_iter().map(to_tiles).collect();
-        let tiles = grid.all_tiles();
-        let together = shares(o, FEW);
-        let mut products = Buffer::any(N * N * tiles * o);
-        let parts = split(&mut products, together.iter().map(|few| N * N * tiles * few.len()));
-        together.par_iter().zip(parts).for_each(|(few, products)| {
-            let mut factors = Buffer::any(N * N * c * few.len());
-            kernel(few.clone(), &mut factors);
-            for (plane, products) in products.chunks_exact_mut(tiles * few.len()).enumerate() {
-                let factors = &factors[plane * c * few.len()..];
+        return;
+    }
+    let planes: Vec<Buffer> = grid.blocks.par_iter().map(to_tiles).collect();
+    let tiles = grid.all_tiles();
+    let len = |few: &Range<usize>| N * N * stride(tiles * few.len());
+    let mut products = Buffer::any(together.iter().map(len).sum());
+    let mut products = split(&mut products, together.iter().map(len));
+    together.par_iter().zip(&mut products).for_each(|(few, products)| {
+        let mut factors = Buffer::any(N * N * stride(CHUNK * few.len()));
+        for chunk in shares(c, CHUNK) {
+            kernel(few, chunk.clone(), &mut factors);
+            for (plane, products) in
+                products.chunks_exact_mut(stride(tiles * few.len())).enumerate()
+            {
+                let factors = &factors[plane * stride(chunk.len() * few.len())..];
                 let mut products = products;
-                for planes in &planes {
-                    let tiles = planes.len() / (N * N * c);
+                for (block, planes) in grid.blocks.iter().zip(&planes) {
+                    let tiles = grid.tiles(block);
                     let (product, rest) = products.split_at_mut(tiles * few.len());
                     products = rest;
-                    pairs(few.len(), c, tiles, factors, &planes[plane * tiles * c..], product);
+                    let plane = &planes[plane * stride(tiles * c)..];
+                    pairs(few, &chunk, factors, plane, tiles, product);
                 }
             }
-        });
-        drop(planes);
-        let firsts = grid.blocks.iter().scan(0, |first, block| {
-            *first += grid.tiles(block);
-            Some(*first - grid.tiles(block))
-        });
-        let blocks: Vec<_> = grid.blocks.iter().zip(firsts).zip(outs).collect();
-        blocks.into_par_iter().for_each(|((block, first), out)| {
-            let places = Products { numbers: &products, tiles, first, together: &together };
-            widest(FromTiles::<N, M> { shape, grid: &grid, products: places, block, bias, out });
-        });
-    }
-}
-
-/// The channels of a plane, `[tiles][c]` to `[tiles][few]` by factors `[c][few]`.
-fn pairs(few: usize, c: usize, tiles: usize, factors: &[f32], plane: &[f32], product: &mut [f32]) {
-    let left = Matrix { numbers: factors, down: 1, right: few };
-    let right = Matrix { numbers: plane, down: 1, right: c };
-    multiply([few, tiles, c], left, right, product, few, false);
+        }
+    });
+    drop(planes);
+    let firsts = grid.blocks.iter().scan(0, |first, block| {
+        *first += grid.tiles(block);
+        Some(*first - grid.tiles(block))
+    });
+    let blocks: Vec<_> = grid.blocks.iter().zip(firsts).zip(outs).collect();
+    blocks.into_par_iter().for_each(|((block, first), out)| {
+        for (few, numbers) in together.iter().zip(&products) {
+            let products = Products { numbers, tiles, first, few };
+            widest(FromTiles::<N, M> { shape, grid: &grid, products, block, bias, out });
+        }
+    });
 }
 
 pub(crate) fn backward_weight<const N: usize, const M: usize>(
@@ -161,59 +183,67 @@ pub(crate) fn backward_weight<const N: usize, const M: usize>(
     let grid = Grid::new(shape, M);
     let (c, o) = (shape.channels, shape.out_channels);
     let to_tiles = |block: &Block| {
-        let mut planes = Buffer::any(N * N * grid.tiles(block) * c);
-        let mut grads = Buffer::any(N * N * grid.tiles(block) * o);
+        let tiles = grid.tiles(block);
+        let mut planes = Buffer::any(N * N * stride(tiles * c));
+        let mut grads = Buffer::any(N * N * stride(tiles * o));
         let to = &mut planes;
         widest(ToTiles::<N, M> { shape, grid: &grid, x, block, planes: to });
         let to = &mut grads;
         widest(ToProducts::<N, M> { shape, grid: &grid, grad_out, block, planes: to });
-        (planes, grads)
+        (tiles, planes, grads)
     };
-    // Adds the products of a block to a plane's factors `[c][few]`.
-    let pairs =
-        |few: &Range<usize>, plane: usize, block: &(Buffer, Buffer), sum: &mut [f32], add| {
-            let (planes, grads) = block;
-            let tiles = planes.len() / (N * N * c);
-            let grads = &grads[plane * tiles * o + few.start..];
-            let left = Matrix { numbers: grads, down: 1, right: o };
-            let right = Matrix { numbers: &planes[plane * tiles * c..], down: c, right: 1 };
-            multiply([few.len(), c, tiles], left, right, sum, few.len(), add);
-        };
+    // Adds the products of a block to the planes' factors `[chunk][few]`.
+    let pairs = |few: &Range<usize>,
+                 chunk: &Range<usize>,
+                 block: &(usize, Buffer, Buffer),
+                 sums: &mut [f32],
+                 add| {
+        let (tiles, planes, grads) = block;
+        let factors = stride(chunk.len() * few.len());
+        for (plane, sum) in sums.chunks_exact_mut(factors).enumerate() {
+            let numbers = &grads[plane * stride(tiles * o) + few.start..];
+            let left = Matrix { numbers, down: 1, right: o };
+            let numbers = &planes[plane * stride(tiles * c) + chunk.start..];
+            let right = Matrix { numbers, down: c, right: 1 };
+            multiply([few.len(), chunk.len(), *tiles], left, right, sum, few.len(), add);
+        }
+    };
+    let together = shares(o, TOGETHER);
+    let grads = split(grad_weight, together.iter().map(|few| few.len() * c * 9));
     if c * o < LARGE {
-        let together = shares(o, TOGETHER);
-        let lens = together.iter().map(|few| N * N * c * few.len());
+        let len = |few: &Range<usize>| N * N * stride(c * few.len());
+        let all: usize = together.iter().map(len).sum();
         let pieces = shares(grid.blocks.len(), grid.blocks.len().div_ceil(8));
-        let mut sums = Buffer::any(pieces.len() * N * N * c * o);
-        sums.par_chunks_exact_mut(N * N * c * o).zip(&pieces).for_each(|(sum, piece)| {
+        let mut sums = Buffer::any(pieces.len() * all);
+        sums.par_chunks_exact_mut(all).zip(&pieces).for_each(|(sum, piece)| {
             for (i, block) in grid.blocks[piece.clone()].iter().enumerate() {
                 let block = to_tiles(block);
-                for (few, sum) in together.iter().zip(split(sum, lens.clone())) {
-                    for (plane, sum) in sum.chunks_exact_mut(c * few.len()).enumerate() {
-                        pairs(few, plane, &block, sum, i > 0);
-                    }
+                for (few, sum) in together.iter().zip(split(sum, together.iter().map(len))) {
+                    pairs(few, &(0..c), &block, sum, i > 0);
                 }
             }
         });
-        let mut sum = Buffer::any(N * N * c * o);
+        let mut sum = Buffer::any(all);
         add_up(&sums, &mut sum);
-        for (few, sum) in together.iter().zip(split(&mut sum, lens)) {
-            let grad = &mut grad_weight[few.start * c * 9..few.end * c * 9];
-            widest(FromFactors::<N> { channels: c, few: few.len(), planes: sum, grad });
+        let sums = split(&mut sum, together.iter().map(len));
+        for ((few, grad), planes) in together.iter().zip(grads).zip(sums) {
+            let few = few.len();
+            widest(FromFactors::<N> { channels: c, few, chunk: 0..c, planes, grad });
         }
-    } else {
-        let blocks: Vec<_> = grid.blocks.par_iter().map(to_tiles).collect();
-        let together = shares(o, FEW);
-        let grads = split(grad_weight, together.iter().map(|few| few.len() * c * 9));
-        together.par_iter().zip(grads).for_each(|(few, grad)| {
-            let mut sum = Buffer::any(N * N * c * few.len());
-            for (plane, sum) in sum.chunks_exact_mut(c * few.len()).enumerate() {
-                for (i, block) in blocks.iter().enumerate() {
-                    pairs(few, plane, block, sum, i > 0);
-                }
-            }
-            widest(FromFactors::<N> { channels: c, few: few.len(), planes: &sum, grad });
-        });
+        return;
     }
+    let blocks: Vec<_> = grid.blocks.par_iter().map(to_tiles).collect();
+    together.par_iter().zip(grads).for_each(|(few, grad)| {
+        let mut sums = Buffer::any(N * N * stride(CHUNK * few.len()));
+        for chunk in shares(c, CHUNK) {
+            let sums = &mut sums[..N * N * stride(chunk.len() * few.len())];
+            for (i, block) in blocks.iter().enumerate() {
+                pairs(few, &chunk, block, sums, i > 0);
+            }
+            let few = few.len();
+            widest(FromFactors::<N> { channels: c, few, chunk, planes: sums, grad });
+        }
+    });
 }
 
 /// Inputs of a block to planes `[N * N][tiles][C]`.
@@ -232,7 +262,7 @@ impl<const N: usize, const M: usize> WithSimd for ToTiles<'_, N, M> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { shape, grid, x, block, planes } = self;
         let (c, height, width) = (shape.channels, shape.height, shape.width);
-        let plane = grid.tiles(block) * c;
+        let plane = stride(grid.tiles(block) * c);
         for (tile, (image, down, across)) in grid.places(block).enumerate() {
             let inside = |at: usize, padding: usize, side: usize| {
                 let from = padding.saturating_sub(at).min(N);
@@ -303,7 +333,7 @@ impl<const N: usize, const M: usize> WithSimd for ToProducts<'_, N, M> {
         let Self { shape, grid, grad_out, block, planes } = self;
         let o = shape.out_channels;
         let [height, width] = shape.out();
-        let plane = grid.tiles(block) * o;
+        let plane = stride(grid.tiles(block) * o);
         for (tile, (image, down, across)) in grid.places(block).enumerate() {
             let (ys, xs) = ((height - down * M).min(M), (width - across * M).min(M));
             let corner = ((image * height + down * M) * width + across * M) * o;
@@ -334,13 +364,13 @@ impl<const N: usize, const M: usize> WithSimd for ToProducts<'_, N, M> {
     }
 }
 
-/// Products `[O / few][N * N][tiles][few]`.
+/// Products of a few channels, `[N * N][tiles][few]`.
 struct Products<'a> {
     numbers: &'a [f32],
     tiles: usize,
     /// The first tile of the block.
     first: usize,
-    together: &'a [Range<usize>],
+    few: &'a Range<usize>,
 }
 
 /// Products of a block to its results.
@@ -367,31 +397,29 @@ impl<const N: usize, const M: usize> WithSimd for FromTiles<'_, N, M> {
             let (ys, xs) = ((height - down * M).min(M), (width - across * M).min(M));
             let row = (image - block.images.start) * rows + down * M - first_row;
             let corner = (row * width + across * M) * o;
-            for few in products.together {
-                let numbers = &products.numbers[N * N * products.tiles * few.start..];
-                let plane = products.tiles * few.len();
-                for channel in (0..few.len()).step_by(S::F32_LANES) {
-                    let at = (products.first + tile) * few.len() + channel;
-                    let mut half = [[simd.splat_f32s(0.0); N]; M];
-                    for j in 0..N {
-                        let mut column = [simd.splat_f32s(0.0); N];
-                        for (i, column) in column.iter_mut().enumerate() {
-                            *column = load(simd, numbers, (i * N + j) * plane + at);
-                        }
-                        let column = tile::output::<S, N, M>(simd, column);
-                        for i in 0..M {
-                            half[i][j] = column[i];
-                        }
+            let (numbers, few) = (products.numbers, products.few);
+            let plane = stride(products.tiles * few.len());
+            for channel in (0..few.len()).step_by(S::F32_LANES) {
+                let at = (products.first + tile) * few.len() + channel;
+                let mut half = [[simd.splat_f32s(0.0); N]; M];
+                for j in 0..N {
+                    let mut column = [simd.splat_f32s(0.0); N];
+                    for (i, column) in column.iter_mut().enumerate() {
+                        *column = load(simd, numbers, (i * N + j) * plane + at);
                     }
-                    let channel = few.start + channel;
-                    let bias = bias.map(|bias| load(simd, &bias[..few.end], channel));
-                    for (i, half) in half.into_iter().enumerate().take(ys) {
-                        let row = tile::output::<S, N, M>(simd, half);
-                        for (j, value) in row.into_iter().enumerate().take(xs) {
-                            let value = bias.map_or(value, |bias| simd.add_f32s(value, bias));
-                            let to = &mut out[corner + (i * width + j) * o..][..few.end];
-                            store(simd, to, channel, value);
-                        }
+                    let column = tile::output::<S, N, M>(simd, column);
+                    for i in 0..M {
+                        half[i][j] = column[i];
+                    }
+                }
+                let channel = few.start + channel;
+                let bias = bias.map(|bias| load(simd, &bias[..few.end], channel));
+                for (i, half) in half.into_iter().enumerate().take(ys) {
+                    let row = tile::output::<S, N, M>(simd, half);
+                    for (j, value) in row.into_iter().enumerate().take(xs) {
+                        let value = bias.map_or(value, |bias| simd.add_f32s(value, bias));
+                        let to = &mut out[corner + (i * width + j) * o..][..few.end];
+                        store(simd, to, channel, value);
                     }
                 }
             }
@@ -399,13 +427,14 @@ impl<const N: usize, const M: usize> WithSimd for FromTiles<'_, N, M> {
     }
 }
 
-/// The weight of a few channels to factors `[N * N][C][few]`.
+/// The weight of a few channels, and a chunk of the input's, to factors `[N * N][chunk][few]`.
 struct ToFactors<'a, const N: usize> {
     shape: &'a Shape,
     /// `[O, C, 3, 3]`; of the forward pass `[C, O, 3, 3]` where turned.
     weight: &'a [f32],
     turned: bool,
-    channels: Range<usize>,
+    few: Range<usize>,
+    chunk: Range<usize>,
     planes: &'a mut [f32],
 }
 
@@ -417,14 +446,15 @@ impl<const N: usize> WithSimd for ToFactors<'_, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { shape, weight, turned, channels, planes } = self;
-        let (c, o, few) = (shape.channels, shape.out_channels, channels.len());
+        let Self { shape, weight, turned, few, chunk, planes } = self;
+        let (c, o) = (shape.channels, shape.out_channels);
+        let plane = stride(chunk.len() * few.len());
         let (next_out, next_in) = if turned { (9, 9 * o) } else { (9 * c, 9) };
-        for first in (0..few).step_by(S::F32_LANES) {
-            let lanes = (few - first).min(S::F32_LANES);
-            for channel in 0..c {
+        for first in (0..few.len()).step_by(S::F32_LANES) {
+            let lanes = (few.len() - first).min(S::F32_LANES);
+            for (at, channel) in chunk.clone().enumerate() {
                 let mut taps = [[0.0; WIDEST]; 9];
-                let from = (channels.start + first) * next_out + channel * next_in;
+                let from = (few.start + first) * next_out + channel * next_in;
                 for lane in 0..lanes {
                     let kernel = &weight[from + lane * next_out..][..9];
                     for tap in 0..9 {
@@ -442,8 +472,8 @@ impl<const N: usize> WithSimd for ToFactors<'_, N> {
                 for (i, half) in half.into_iter().enumerate() {
                     let row = tile::kernel::<S, N>(simd, half);
                     for (j, value) in row.into_iter().enumerate() {
-                        let to = &mut planes[((i * N + j) * c + channel) * few..][..few];
-                        store(simd, to, first, value);
+                        let to = (i * N + j) * plane + at * few.len();
+                        store(simd, &mut planes[to..][..few.len()], first, value);
                     }
                 }
             }
@@ -451,10 +481,11 @@ impl<const N: usize> WithSimd for ToFactors<'_, N> {
     }
 }
 
-/// Gradients of factors `[N * N][C][few]` to those of the weight `[few, C, 3, 3]`.
+/// Gradients of factors `[N * N][chunk][few]` to those of the weight `[few, C, 3, 3]`.
 struct FromFactors<'a, const N: usize> {
     channels: usize,
     few: usize,
+    chunk: Range<usize>,
     planes: &'a [f32],
     grad: &'a mut [f32],
 }
@@ -464,15 +495,16 @@ impl<const N: usize> WithSimd for FromFactors<'_, N> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { channels: c, few, planes, grad } = self;
+        let Self { channels: c, few, chunk, planes, grad } = self;
+        let plane = stride(chunk.len() * few);
         for first in (0..few).step_by(S::F32_LANES) {
             let lanes = (few - first).min(S::F32_LANES);
-            for channel in 0..c {
+            for (at, channel) in chunk.clone().enumerate() {
                 let mut half = [[simd.splat_f32s(0.0); N]; 3];
                 for j in 0..N {
                     let mut column = [simd.splat_f32s(0.0); N];
                     for (i, column) in column.iter_mut().enumerate() {
-                        let at = ((i * N + j) * c + channel) * few + first;
+                        let at = (i * N + j) * plane + at * few + first;
                         *column = load(simd, planes, at);
                     }
                     let column = tile::kernel_adjoint::<S, N>(simd, column);

@@ -1,4 +1,5 @@
-//! Matrix products, the one place where raw pointers are handled.
+//! What Rust cannot check, all in this file: `gemm`, which takes raw pointers, and a switch of the
+//! C library's allocator.
 #![allow(unsafe_code)]
 
 use gemm::Parallelism;
@@ -65,5 +66,23 @@ pub(crate) fn multiply(
             false,
             Parallelism::None,
         );
+    }
+}
+
+/// See [`crate::buffers::keep_freed_memory`].
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(crate) fn keep_freed_memory() {
+    use std::ffi::c_int;
+    // Of glibc's malloc.h.
+    const TRIM_THRESHOLD: c_int = -1;
+    const MMAP_MAX: c_int = -4;
+    unsafe extern "C" {
+        fn mallopt(parameter: c_int, value: c_int) -> c_int;
+    }
+    // SAFETY: glibc declares `int mallopt(int, int)`; it may be called at any time, locks what it
+    // changes, and these two parameters only tell when memory is given back to the system.
+    unsafe {
+        mallopt(MMAP_MAX, 0);
+        mallopt(TRIM_THRESHOLD, c_int::MAX);
     }
 }
