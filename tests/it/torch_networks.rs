@@ -77,7 +77,7 @@ fn made(config: &TrainConfig, frames: usize) -> (Weights, Network, Batch) {
 #[test]
 #[ignore = "writes what tests/peers/torch_networks.py needs into the folder PMP_EXPORT"]
 fn networks_are_exported() {
-    let folder = std::env::var("PMP_EXPORT").expect("PMP_EXPORT names a folder");
+    let folder = std::env::var_os("PMP_EXPORT").expect("PMP_EXPORT names a folder");
     let folder = Path::new(&folder);
     fs::create_dir_all(folder).unwrap();
     for (name, model, preset, frames) in CASES {
