@@ -103,13 +103,13 @@ pub fn scan(
     let world_from_radar = *world_from_ego * config.ego_from_radar;
     let origin_m = world_from_radar.translation.as_vec3();
     let (width_rad, height_rad) = (config.width_deg.to_radians(), config.height_deg.to_radians());
-    let rain = Rain::of(sky.weather);
+    let (rain, rays) = (Rain::of(sky.weather), reach.rays());
     let mut returns = Vec::new();
     for _ in 0..config.rays() {
         let azimuth_rad = noise.uniform(-0.5, 0.5) * width_rad;
         let elevation_rad = noise.uniform(-0.5, 0.5) * height_rad;
         let ray = world_from_radar.transform_vector3(direction(azimuth_rad, elevation_rad));
-        let Some(hit) = reach.hit(origin_m, ray.as_vec3(), config.range_m as f32) else {
+        let Some(hit) = rays.hit(origin_m, ray.as_vec3(), config.range_m as f32) else {
             continue;
         };
         let facing = hit.normal.as_dvec3().dot(ray).abs();

@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::{curves::WHOLE, light::Light},
+    sensors::{camera::light::Light, floats::WHOLE},
 };
 
 /// Random numbers that are drawn once and used again from other places.

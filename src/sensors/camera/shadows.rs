@@ -8,10 +8,12 @@ use crate::{
         mesh::{Material, Mesh, Vertex},
         surroundings::Surroundings,
     },
-    sensors::camera::{
-        curves::split,
-        light::{Light, luminance},
-        raster::{Bounds, Visibility},
+    sensors::{
+        camera::{
+            light::{Light, luminance},
+            raster::{Bounds, Visibility},
+        },
+        floats::split,
     },
 };
 
