@@ -50,6 +50,9 @@ const JACKETS: [[u8; 3]; 10] = [
     [210, 170, 60],
 ];
 
+/// No body reaches further from its origin than this, m.
+pub const LARGEST_BODY_M: f32 = 12.0;
+
 /// A mesh somewhere in the world: a vehicle, or somebody on foot in a pose.
 #[derive(Clone, Debug)]
 pub struct Body {

@@ -17,15 +17,12 @@ use obvhs::{
 
 use crate::{
     scene::{
-        instant::{Body, Instant},
+        instant::{Body, Instant, LARGEST_BODY_M},
         mesh::{Material, Mesh, Triangle},
         surroundings::{Surroundings, Tile},
     },
     world::reservation::ActorId,
 };
-
-/// No body reaches further from its origin than this, m.
-const LARGEST_BODY_M: f32 = 12.0;
 
 /// What a ray has met.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -186,7 +186,9 @@ impl<'f> Sweep<'f> {
         let places = mesh.vertices.iter().map(|vertex| Corner::new(seen_m(vertex.position_m)));
         self.corners.extend(places);
         for triangle in &mesh.triangles {
-            let corners = triangle.corners.map(|corner| self.corners[corner as usize]);
+            let [a, b, c] = triangle.corners;
+            let (a, b, c) = (a as usize, b as usize, c as usize);
+            let corners = [self.corners[a], self.corners[b], self.corners[c]];
             if self.fill(&corners) {
                 let [a, b, c] = corners.map(|corner| corner.place_m);
                 let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -220,7 +222,8 @@ impl<'f> Sweep<'f> {
         // Along an edge the tangent is a part of a sine, and no larger than this anywhere.
         let half = 0.5 * (last_rad - first_rad);
         let swell = 1.0 / (1.0 - 0.5 * half * half);
-        if half < 0.5 && fan.below(least(low, low * swell)) == fan.below(most(high, high * swell)) {
+        let first_beam = fan.below(least(low, low * swell));
+        if half < 0.5 && fan.tangents[first_beam] >= most(high, high * swell) {
             return false;
         }
         let range = |from: i32, to: i32| from.clamp(0, count) as usize..to.clamp(0, count) as usize;
@@ -247,21 +250,23 @@ impl<'f> Sweep<'f> {
 
     #[inline]
     fn fill_column(&mut self, column: usize, cut: &Cut) -> bool {
-        let (from, to) = (self.fan.below(cut.from), self.fan.below(cut.to));
-        if from >= to {
+        let mut beam = self.fan.below(cut.from);
+        let mut tangent = self.fan.tangents[beam];
+        if tangent >= cut.to {
             return false;
         }
         let start = column * self.fan.beams().len();
         let growth = (cut.nearness_to - cut.nearness_from) / (cut.to - cut.from);
-        let facet = self.facets.len() as u32;
         let mut is_met = false;
-        for beam in from..to {
-            let nearness = cut.nearness_from + growth * (self.fan.tangents[beam] - cut.from);
+        while tangent < cut.to {
+            let nearness = cut.nearness_from + growth * (tangent - cut.from);
             if nearness > self.nearness[start + beam] {
                 self.nearness[start + beam] = nearness;
-                self.facet[start + beam] = facet;
+                self.facet[start + beam] = self.facets.len() as u32;
                 is_met = true;
             }
+            beam += 1;
+            tangent = self.fan.tangents[beam];
         }
         is_met
     }

@@ -73,7 +73,7 @@ fn rectangle(from_m: Vec3, along_m: Vec3, across_m: Vec3, material: Material) ->
 
 fn town_of(meshes: Vec<Mesh>) -> Standing {
     let bound_m = Vec3::splat(1000.0);
-    let tile = |mesh| Tile { low_m: -bound_m, high_m: bound_m, mesh };
+    let tile = |mesh: Mesh| Tile { low_m: -bound_m, high_m: bound_m, mesh: mesh.into() };
     Standing::new(&Surroundings { tiles: meshes.into_iter().map(tile).collect() })
 }
 

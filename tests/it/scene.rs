@@ -1,7 +1,7 @@
 //! Towns and all that moves in them as triangles: where they should be, the right way round, the
 //! same every time.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use glam::{DVec2, DVec3, Vec3};
 use pmp::{
@@ -196,9 +196,11 @@ fn a_town_out_of_its_place_is_found_out() {
     let foreign = Surroundings::of(&towns()[0].map, &Scenery::derive(&towns()[0].map, 0));
     assert!(wrong_on_lanes(&towns()[1].map, &foreign).is_some());
     let mut turned = foreign;
-    turned.tiles.iter_mut().flat_map(|tile| &mut tile.mesh.triangles).for_each(|face| {
-        face.corners.swap(0, 1);
-    });
+    turned.tiles.iter_mut().flat_map(|tile| &mut Arc::make_mut(&mut tile.mesh).triangles).for_each(
+        |face| {
+            face.corners.swap(0, 1);
+        },
+    );
     assert!(upside_down(&turned).is_some());
 }
 
