@@ -137,12 +137,14 @@ pub fn turn(
     );
     let sweep = Sweep::new(&fan, reach, lidar_from_world, origin_m, config.range_m as f32);
     let mut returns = Vec::with_capacity(config.beams * config.columns / 2);
+    let mut spare_m = None;
     for (column, axis) in columns.iter().enumerate() {
         for (ring, (up, level)) in rings.iter().enumerate() {
-            if noise.chance(config.dropped) {
+            // One draw for both losses: those that the first leaves are spread evenly again.
+            let luck = noise.uniform(0.0, 1.0) - config.dropped;
+            if luck < 0.0 {
                 continue;
             }
-            let beam = (*level * *axis).extend(*up).as_vec3();
             let met = sweep.met(column, ring);
             let seen = if rain.scattered > 0.0 && noise.chance(rain.scattered) {
                 Some(drop(met, noise))
@@ -150,12 +152,17 @@ pub fn turn(
                 met.map(|met| (f64::from(met.range_m), config.intensity(&met, &rain)))
             };
             let Some((range_m, intensity)) = seen else { continue };
-            if noise.chance(config.dropped_for(intensity)) {
+            if luck < (1.0 - config.dropped) * config.dropped_for(intensity) {
                 continue;
             }
-            let measured_m = range_m + noise.normal(config.range_std_m);
+            let error_m = spare_m.take().unwrap_or_else(|| {
+                let [now_m, then_m] = noise.normal_pair(config.range_std_m);
+                spare_m = Some(then_m);
+                now_m
+            });
+            let beam = (*level * *axis).extend(*up) * (range_m + error_m);
             returns.push(LidarReturn {
-                position_m: (beam * measured_m as f32).to_array(),
+                position_m: beam.as_vec3().to_array(),
                 intensity: intensity as f32,
                 ring: ring as u16,
             });

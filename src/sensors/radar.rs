@@ -103,7 +103,9 @@ pub fn scan(
     let world_from_radar = *world_from_ego * config.ego_from_radar;
     let origin_m = world_from_radar.translation.as_vec3();
     let (width_rad, height_rad) = (config.width_deg.to_radians(), config.height_deg.to_radians());
-    let (rain, rays) = (Rain::of(sky.weather), reach.rays());
+    let rain = Rain::of(sky.weather);
+    let ahead = world_from_radar.matrix3.x_axis.as_vec3();
+    let rays = reach.rays_towards(ahead, (0.5 * width_rad.hypot(height_rad)) as f32);
     let mut returns = Vec::new();
     for _ in 0..config.rays() {
         let azimuth_rad = noise.uniform(-0.5, 0.5) * width_rad;

@@ -4,7 +4,7 @@
 //! The tree of a town is built once, with time spent on its quality. What moves is few triangles,
 //! and of those only the bodies near a sensor count, so their tree is built anew at every instant.
 
-use std::time::Duration;
+use std::{f32::consts::PI, time::Duration};
 
 use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::{
@@ -94,11 +94,25 @@ impl<'a> Reach<'a> {
         })
     }
 
-    /// Ready for rays.
+    /// Ready for rays from the place, in any direction.
     pub fn rays(&self) -> Rays<'a> {
+        self.rays_towards(Vec3::X, PI)
+    }
+
+    /// Ready for rays from near the place that turn from a direction (unit length) by `most_rad` at most.
+    pub fn rays_towards(&self, direction: Vec3, most_rad: f32) -> Rays<'a> {
         let mut corners = Vec::new();
         let mut surfaces = Vec::new();
-        for (index, body) in self.bodies() {
+        let place_m = self.place_m;
+        let may_be_met = |body: &Body| {
+            let way_m = Vec3::from(body.world_from_body.translation) - place_m;
+            // It, and the ray's beginning, lie within this.
+            let reach_m = 2.0 * LARGEST_BODY_M;
+            let distance_m = way_m.length();
+            distance_m < reach_m
+                || way_m.angle_between(direction) < most_rad + (reach_m / distance_m).asin()
+        };
+        for (index, body) in self.bodies().filter(|(_, body)| may_be_met(body)) {
             add(&body.mesh, &body.world_from_body, &mut corners);
             let triangles = body.mesh.triangles.iter();
             surfaces.extend(triangles.map(|triangle| Surface::of(triangle, Some(index))));
