@@ -402,14 +402,21 @@ fn the_same_seed_gives_the_same_returns() {
     assert_ne!(scan(1), scan(2));
 }
 
-/// Somebody on foot, 15 m ahead, comes back as often under any sky as on a clear day.
+/// People on foot 15 m away come back as often under any sky as on a clear day.
 #[test]
 fn no_sky_hides_anybody_from_lidar_and_radar() {
     const TURNS: usize = 20;
     const SCANS: usize = 200;
+    const PEOPLE: u32 = 24;
     let plain = plain();
     let mesh = SHAPES.walker(&somebody(WalkerKind::Adult, 9, 0.0, 0.0));
-    let instant = instant(vec![body(mesh, 9, Vec3::X * 15.0, 1.6, DVec3::ZERO)]);
+    // All around the car; the radar sees the one ahead.
+    let place = |id: u32| {
+        let angle_rad = TAU as f32 * id as f32 / PEOPLE as f32;
+        let at_m = Vec2::from_angle(angle_rad).extend(0.0) * 15.0;
+        body(mesh.clone(), id, at_m, angle_rad + 1.6, DVec3::ZERO)
+    };
+    let instant = instant((0..PEOPLE).map(place).collect());
     let reach = Reach::new(&plain, &instant, Vec3::ZERO, 100.0);
     let at = DAffine3::IDENTITY;
     let seen = |sky: Sky| {
@@ -417,7 +424,7 @@ fn no_sky_hides_anybody_from_lidar_and_radar() {
         let mut turn = || lidar::turn(&LidarConfig::default(), &reach, &at, sky, &mut noise);
         let is_on = |p: &LidarReturn| {
             let [x, y, z] = p.position_m;
-            (14.5..15.5).contains(&x) && y.abs() < 0.5 && z > -1.6
+            (14.5..15.5).contains(&x.hypot(y)) && z > -1.6
         };
         let points: usize =
             (0..TURNS).map(|_| turn().iter().filter(|point| is_on(point)).count()).sum();
@@ -425,8 +432,8 @@ fn no_sky_hides_anybody_from_lidar_and_radar() {
         let config = RadarConfig::default();
         let mut scan = || radar::scan(&config, &reach, &at, DVec3::ZERO, sky, &mut noise);
         let echoes: usize =
-            (0..SCANS).map(|_| scan().iter().filter(|r| r.actor == Some(9)).count()).sum();
-        [points as f64 / TURNS as f64, echoes as f64 / SCANS as f64]
+            (0..SCANS).map(|_| scan().iter().filter(|r| r.actor == Some(0)).count()).sum();
+        [points as f64 / (TURNS as f64 * f64::from(PEOPLE)), echoes as f64 / SCANS as f64]
     };
     let day = seen(CLEAR_DAY);
     for (illumination, weather) in
@@ -434,7 +441,7 @@ fn no_sky_hides_anybody_from_lidar_and_radar() {
     {
         let now = seen(Sky { illumination, weather });
         println!(
-            "{} {}: {:.1} returns a turn, {:.2} a scan",
+            "{} {}: {:.2} returns a turn, {:.2} a scan",
             weather.name(),
             illumination.name(),
             now[0],

@@ -115,7 +115,7 @@ impl Water<'_> {
         let last = run.end - 1;
         knots.clear();
         knots.extend(run.clone().step_by(KNOTS_PX).map(|column| self.knot(row, column, is_level)));
-        if (last - run.start) % KNOTS_PX > 0 {
+        if !(last - run.start).is_multiple_of(KNOTS_PX) {
             knots.push(self.knot(row, last, is_level));
         }
         // What is mirrored lies all over the memory: asked for at once, it comes at once.
