@@ -1,13 +1,13 @@
 //! How much of a laser pulse and of a radar wave comes back from what.
 //!
 //! Light is that of 905 nm. Roads, side-walks and bark are medians at 0.90 um of 170, 60 and 25
-//! spectra measured in Santa Barbara (Herold and others, 2004), leaves that of 2000 canopies modelled
-//! with PROSAIL, both as the library of spectra earthlib 1.1.0 has them; a quarter of the roads lie below 0.07,
-//! a quarter above 0.15. What is left is chosen between these: paint with its glass beads bright,
-//! walls and metal in the middle, rubber dark; coachwork and clothes spread widely, so their colour
-//! decides. What the radar is told is chosen as well, so that metal dominates a scan and flat ground
-//! hardly shows; gains keep the order of radar cross sections as measured near 77 GHz (cars some
-//! +10 dBsm, people some -8 dBsm).
+//! spectra measured in Santa Barbara (Herold and others, 2004), leaves that of 2000 canopies
+//! modelled with PROSAIL, both as the library of spectra earthlib 1.1.0 has them; a quarter of the
+//! roads lie below 0.07, a quarter above 0.15. What is left is chosen between these: paint with its
+//! glass beads bright, walls and metal in the middle, rubber dark; coachwork and clothes spread
+//! widely, so their colour decides. What the radar is told is chosen as well, so that metal dominates
+//! a scan and flat ground hardly shows; gains keep the order of radar cross sections as measured near
+//! 77 GHz (cars some +10 dBsm, people some -8 dBsm).
 
 use crate::scene::mesh::Material;
 

@@ -16,9 +16,10 @@ use crate::{
     scene::conditions::Sky,
     sensors::{
         echo,
+        fan::Fan,
         rain::Rain,
         rays::Reach,
-        sweep::{Fan, Met, Sweep},
+        sweep::{Met, Sweep},
     },
 };
 

@@ -5,6 +5,7 @@
 
 pub mod floats;
 pub mod rays;
+pub mod fan;
 pub mod sweep;
 pub mod rain;
 pub mod echo;

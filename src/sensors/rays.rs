@@ -99,7 +99,8 @@ impl<'a> Reach<'a> {
         self.rays_towards(Vec3::X, PI)
     }
 
-    /// Ready for rays from near the place that turn from a direction (unit length) by `most_rad` at most.
+    /// Ready for rays from near the place that turn from a direction (unit length) by `most_rad` at
+    /// most.
     pub fn rays_towards(&self, direction: Vec3, most_rad: f32) -> Rays<'a> {
         let mut corners = Vec::new();
         let mut surfaces = Vec::new();

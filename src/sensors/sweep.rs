@@ -1,10 +1,10 @@
 //! What the beams of a lidar's turn meet first: triangles drawn onto a grid of columns and beams.
 //!
 //! All beams of a turn leave one place, and those of one column lie in one upright half-plane of the
-//! lidar. On it an edge of a triangle is a point whose tangent of elevation is linear in the direction of
-//! the column, and 1 / distance to the triangle is linear in both. So a turn is drawn as a picture is,
-//! column by column, with what is nearest kept: exact as rays are, and several times faster, since the few
-//! thousand triangles around a car are gone through once instead of a tree for each beam.
+//! lidar. On it an edge of a triangle is a point whose tangent of elevation is linear in the direction
+//! of the column, and 1 / distance to the triangle is linear in both. So a turn is drawn as a picture
+//! is, column by column, with what is nearest kept: exact as rays are, and several times faster, since
+//! the few thousand triangles around a car are gone through once instead of a tree for each beam.
 
 use std::{f32::consts::PI, ops::Range};
 
@@ -13,25 +13,11 @@ use glam::{Mat3, Vec2, Vec3};
 use crate::{
     scene::mesh::{Material, Mesh, Triangle, Vertex},
     sensors::{
-        floats::{ceil, least, most, nearest},
+        fan::Fan,
+        floats::{ceil, least, most},
         rays::{self, Reach},
     },
 };
-
-/// Into how many steps the tangents of the beams are divided to find them, for each beam: few hold
-/// more than one.
-const STEPS: usize = 4;
-
-/// The beams of a turn: the same in each column, in the lidar's frame (x forward, y left, z up).
-#[derive(Clone, Debug)]
-pub struct Fan {
-    /// Of the elevations, and infinity after the last.
-    tangents: Vec<f32>,
-    columns: Vec<Vec2>,
-    /// How many beams lie below each step of tangents, from the lowest beam up.
-    below: Vec<u32>,
-    steps_per_tangent: f32,
-}
 
 /// What a beam has met.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,48 +68,6 @@ impl Corner {
         let azimuth_rad = azimuth_rad(level);
         let column = ceil((azimuth_rad * (0.5 / PI) + 0.5) * columns - 0.5);
         Corner { place_m, azimuth_rad, column, tangent: place_m.z / level.length() }
-    }
-}
-
-impl Fan {
-    /// Tangents ascend; columns are unit vectors in equal steps once around to the left, the first
-    /// half a step beyond the tail.
-    pub fn new(mut tangents: Vec<f32>, columns: Vec<Vec2>) -> Fan {
-        let spread =
-            tangents.last().zip(tangents.first()).map_or(0.0, |(last, first)| last - first);
-        let steps = STEPS * tangents.len();
-        let steps_per_tangent = if spread > 0.0 { steps as f32 / spread } else { 0.0 };
-        tangents.push(f32::INFINITY);
-        let mut fan = Fan { tangents, columns, below: Vec::new(), steps_per_tangent };
-        let below = |step: usize| fan.beams().partition_point(|tangent| fan.step(*tangent) < step);
-        fan.below = (0..=steps).map(|step| below(step) as u32).collect();
-        fan
-    }
-
-    /// Tangents of the elevations of the beams.
-    #[inline]
-    fn beams(&self) -> &[f32] {
-        &self.tangents[..self.tangents.len() - 1]
-    }
-
-    /// The step that a tangent lies in.
-    #[inline]
-    fn step(&self, tangent: f32) -> usize {
-        let steps = (STEPS * self.beams().len()) as f32;
-        let step = (tangent - self.tangents[0]) * self.steps_per_tangent;
-        nearest(least(most(step, 0.0), steps)) as usize
-    }
-
-    /// How many beams have lesser tangents.
-    #[inline]
-    fn below(&self, tangent: f32) -> usize {
-        let mut count = self.below[self.step(tangent)] as usize;
-        // Mostly there is at most one to ask: a sum is quicker than a branch.
-        count += usize::from(self.tangents[count] < tangent);
-        while self.tangents[count] < tangent {
-            count += 1;
-        }
-        count
     }
 }
 
@@ -368,17 +312,6 @@ mod tests {
             let wanted = (step as f32 / 5000.0 - 1.0) * PI;
             let azimuth = azimuth_rad(Vec2::from_angle(wanted) * (0.1 + step as f32));
             assert!((azimuth - wanted).abs() < 2e-5, "{azimuth}, not {wanted}");
-        }
-    }
-
-    #[test]
-    fn beams_are_found_by_their_tangents() {
-        let tangents = vec![-0.6, -0.3, -0.1, -0.05, 0.0, 0.2];
-        let fan = Fan::new(tangents.clone(), Vec::new());
-        for step in -100..100 {
-            let tangent = step as f32 / 100.0;
-            let below = tangents.iter().filter(|other| **other < tangent).count();
-            assert_eq!(fan.below(tangent), below, "{tangent}");
         }
     }
 }
