@@ -54,9 +54,22 @@ impl Noise {
 
     /// Normal with mean zero (Box-Muller).
     pub fn normal(&mut self, std: f64) -> f64 {
+        let (radius, angle) = self.polar();
+        std * radius * angle.cos()
+    }
+
+    /// Two of them, which know nothing of each other, for little more than one.
+    pub fn normal_pair(&mut self, std: f64) -> [f64; 2] {
+        let (radius, angle) = self.polar();
+        let (sin, cos) = angle.sin_cos();
+        [std * radius * cos, std * radius * sin]
+    }
+
+    /// Distance and angle of a place on the plane whose coordinates are normal.
+    fn polar(&mut self) -> (f64, f64) {
         // 1 - u lies in (0, 1], where the logarithm is finite.
         let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
-        std * radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()
+        (radius, std::f64::consts::TAU * self.0.random::<f64>())
     }
 
     /// One of `choices`, which must not be empty.
@@ -80,9 +93,16 @@ mod tests {
     #[test]
     fn normal_has_the_spread_that_was_asked_for() {
         let mut noise = Noise::new(1, 0, Purpose::Imu);
-        let draws: Vec<f64> = (0..20_000).map(|_| noise.normal(2.0)).collect();
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        let std = (draws.iter().map(|x| x * x).sum::<f64>() / draws.len() as f64).sqrt();
-        assert!(mean.abs() < 0.06 && (std - 2.0).abs() < 0.06, "mean {mean}, std {std}");
+        let single: Vec<f64> = (0..20_000).map(|_| noise.normal(2.0)).collect();
+        let pairs: Vec<[f64; 2]> = (0..20_000).map(|_| noise.normal_pair(2.0)).collect();
+        let of = |place: usize| pairs.iter().map(|pair| pair[place]).collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        for draws in [single, of(0), of(1)] {
+            let squares: Vec<f64> = draws.iter().map(|x| x * x).collect();
+            let (mean, std) = (mean(&draws), mean(&squares).sqrt());
+            assert!(mean.abs() < 0.06 && (std - 2.0).abs() < 0.06, "mean {mean}, std {std}");
+        }
+        let products: Vec<f64> = pairs.iter().map(|[a, b]| a * b).collect();
+        assert!(mean(&products).abs() < 0.12, "one of a pair tells of the other");
     }
 }

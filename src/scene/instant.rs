@@ -50,6 +50,9 @@ const JACKETS: [[u8; 3]; 10] = [
     [210, 170, 60],
 ];
 
+/// No body reaches further from its origin than this, m.
+pub const LARGEST_BODY_M: f32 = 12.0;
+
 /// A mesh somewhere in the world: a vehicle, or somebody on foot in a pose.
 #[derive(Clone, Debug)]
 pub struct Body {
@@ -86,9 +89,9 @@ fn vehicle(state: &VehicleState, shapes: &Shapes) -> Body {
     Body {
         actor: state.id,
         mesh: shapes.vehicle(state.kind, state.id),
-        world_from_body: place(&state.footprint, state.ground_m, stretch(state)),
+        world_from_body: place(&state.footprint, state.ground_m, state.climb, stretch(state)),
         colour: coachwork(state.kind, state.colour),
-        velocity_mps: state.velocity_mps.extend(0.0),
+        velocity_mps: state.velocity_mps.extend(speed_mps * state.climb),
         is_braking: state.acceleration_mps2 < BRAKING_MPS2 || speed_mps < STANDING_MPS,
     }
 }
@@ -97,17 +100,20 @@ fn walker(state: &WalkerState, shapes: &Shapes) -> Body {
     Body {
         actor: state.id,
         mesh: shapes.walker(state),
-        world_from_body: place(&state.footprint, state.ground_m, DVec3::ONE),
+        world_from_body: place(&state.footprint, state.ground_m, 0.0, DVec3::ONE),
         colour: one_of(&JACKETS, state.colour),
         velocity_mps: state.velocity_mps.extend(0.0),
         is_braking: false,
     }
 }
 
-/// Where a footprint stands, and how its body is stretched along its axes.
-fn place(footprint: &Footprint, ground_m: f64, stretch: DVec3) -> Affine3A {
-    let (forward, left) = (footprint.forward.extend(0.0), footprint.left().extend(0.0));
-    let axes = DMat3::from_cols(forward * stretch.x, left * stretch.y, DVec3::Z * stretch.z);
+/// Where a footprint stands on ground that climbs along it, and how its body is stretched along its
+/// axes. Lanes are level across, so nothing leans to a side.
+fn place(footprint: &Footprint, ground_m: f64, climb: f64, stretch: DVec3) -> Affine3A {
+    let (forward, left) =
+        (footprint.forward.extend(climb).normalize(), footprint.left().extend(0.0));
+    let up = forward.cross(left);
+    let axes = DMat3::from_cols(forward * stretch.x, left * stretch.y, up * stretch.z);
     DAffine3::from_mat3_translation(axes, footprint.centre_m.extend(ground_m)).as_affine3a()
 }
 

@@ -1,6 +1,9 @@
 //! A whole town as triangles: ground, streets, paint, and what stands beside the streets.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
 
 use glam::{DVec2, Vec3};
 
@@ -29,7 +32,7 @@ const NEAR_ROAD_M: f64 = 12.0;
 pub struct Tile {
     pub low_m: Vec3,
     pub high_m: Vec3,
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
 }
 
 /// All of a town that stands still, in square tiles of 50 m; a triangle belongs to the tile that
@@ -119,7 +122,7 @@ fn tiles(mesh: &Mesh) -> Vec<Tile> {
     let filled = cells.into_values().map(|(mesh, _)| mesh);
     let with_bounds = filled.filter_map(|mesh| {
         let (low_m, high_m) = mesh.bounds_m()?;
-        Some(Tile { low_m, high_m, mesh })
+        Some(Tile { low_m, high_m, mesh: mesh.into() })
     });
     with_bounds.collect()
 }

@@ -9,15 +9,17 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DAffine3, DVec3, Mat3, Vec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 use crate::{
     noise::Noise,
     scene::conditions::Sky,
     sensors::{
         echo,
+        fan::Fan,
         rain::Rain,
-        rays::{Hit, Reach},
+        rays::Reach,
+        sweep::{Met, Sweep},
     },
 };
 
@@ -104,11 +106,10 @@ impl LidarConfig {
     }
 
     /// Intensity of what a beam has met, in [0, 1].
-    fn intensity(&self, hit: &Hit, ray: Vec3, rain: &Rain) -> f64 {
-        let facing = f64::from(hit.normal.dot(ray).abs());
+    fn intensity(&self, met: &Met, rain: &Rain) -> f64 {
         let lost_per_m = self.attenuation_per_m + 2.0 * rain.laser_per_m;
-        let arrived = (-lost_per_m * f64::from(hit.range_m)).exp();
-        (echo::laser(hit.material, hit.colour, facing) * arrived).clamp(0.0, 1.0)
+        let arrived = (-lost_per_m * f64::from(met.range_m)).exp();
+        (echo::laser(met.material, met.colour, f64::from(met.facing)) * arrived).clamp(0.0, 1.0)
     }
 }
 
@@ -125,32 +126,44 @@ pub fn turn(
 ) -> Vec<LidarReturn> {
     let world_from_lidar = *world_from_ego * config.ego_from_lidar;
     let origin_m = world_from_lidar.translation.as_vec3();
-    let axes: Mat3 = world_from_lidar.matrix3.as_mat3();
+    let lidar_from_world = world_from_lidar.matrix3.as_mat3().transpose();
     let rain = Rain::of(sky.weather);
     let rings: Vec<(f64, f64)> =
         (0..config.beams).map(|ring| config.elevation_rad(ring).sin_cos()).collect();
+    let columns: Vec<DVec2> =
+        (0..config.columns).map(|column| DVec2::from_angle(config.azimuth_rad(column))).collect();
+    let fan = Fan::new(
+        rings.iter().map(|(up, level)| (up / level) as f32).collect(),
+        columns.iter().map(|level| level.as_vec2()).collect(),
+    );
+    let sweep = Sweep::new(&fan, reach, lidar_from_world, origin_m, config.range_m as f32);
     let mut returns = Vec::with_capacity(config.beams * config.columns / 2);
-    for column in 0..config.columns {
-        let (left, ahead) = config.azimuth_rad(column).sin_cos();
+    let mut spare_m = None;
+    for (column, axis) in columns.iter().enumerate() {
         for (ring, (up, level)) in rings.iter().enumerate() {
-            if noise.chance(config.dropped) {
+            // One draw for both losses: those that the first leaves are spread evenly again.
+            let luck = noise.uniform(0.0, 1.0) - config.dropped;
+            if luck < 0.0 {
                 continue;
             }
-            let beam = DVec3::new(level * ahead, level * left, *up).as_vec3();
-            let ray = axes * beam;
-            let hit = reach.hit(origin_m, ray, config.range_m as f32);
-            let met = if rain.scattered > 0.0 && noise.chance(rain.scattered) {
-                Some(drop(hit, noise))
+            let met = sweep.met(column, ring);
+            let seen = if rain.scattered > 0.0 && noise.chance(rain.scattered) {
+                Some(drop(met, noise))
             } else {
-                hit.map(|hit| (f64::from(hit.range_m), config.intensity(&hit, ray, &rain)))
+                met.map(|met| (f64::from(met.range_m), config.intensity(&met, &rain)))
             };
-            let Some((range_m, intensity)) = met else { continue };
-            if noise.chance(config.dropped_for(intensity)) {
+            let Some((range_m, intensity)) = seen else { continue };
+            if luck < (1.0 - config.dropped) * config.dropped_for(intensity) {
                 continue;
             }
-            let measured_m = range_m + noise.normal(config.range_std_m);
+            let error_m = spare_m.take().unwrap_or_else(|| {
+                let [now_m, then_m] = noise.normal_pair(config.range_std_m);
+                spare_m = Some(then_m);
+                now_m
+            });
+            let beam = (*level * *axis).extend(*up) * (range_m + error_m);
             returns.push(LidarReturn {
-                position_m: (beam * measured_m as f32).to_array(),
+                position_m: beam.as_vec3().to_array(),
                 intensity: intensity as f32,
                 ring: ring as u16,
             });
@@ -160,8 +173,8 @@ pub fn turn(
 }
 
 /// Range and intensity of a drop of rain before what a beam would have met.
-fn drop(hit: Option<Hit>, noise: &mut Noise) -> (f64, f64) {
+fn drop(met: Option<Met>, noise: &mut Noise) -> (f64, f64) {
     let range_m = NEAREST_DROP_M - DROPS_M * (1.0 - noise.uniform(0.0, 1.0)).ln();
-    let behind_m = hit.map_or(f64::INFINITY, |hit| f64::from(hit.range_m));
+    let behind_m = met.map_or(f64::INFINITY, |met| f64::from(met.range_m));
     (range_m.min(behind_m), noise.uniform(0.0, DROP_INTENSITY))
 }

@@ -104,12 +104,14 @@ pub fn scan(
     let origin_m = world_from_radar.translation.as_vec3();
     let (width_rad, height_rad) = (config.width_deg.to_radians(), config.height_deg.to_radians());
     let rain = Rain::of(sky.weather);
+    let ahead = world_from_radar.matrix3.x_axis.as_vec3();
+    let rays = reach.rays_towards(ahead, (0.5 * width_rad.hypot(height_rad)) as f32);
     let mut returns = Vec::new();
     for _ in 0..config.rays() {
         let azimuth_rad = noise.uniform(-0.5, 0.5) * width_rad;
         let elevation_rad = noise.uniform(-0.5, 0.5) * height_rad;
         let ray = world_from_radar.transform_vector3(direction(azimuth_rad, elevation_rad));
-        let Some(hit) = reach.hit(origin_m, ray.as_vec3(), config.range_m as f32) else {
+        let Some(hit) = rays.hit(origin_m, ray.as_vec3(), config.range_m as f32) else {
             continue;
         };
         let facing = hit.normal.as_dvec3().dot(ray).abs();

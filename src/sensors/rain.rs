@@ -27,9 +27,10 @@ impl Rain {
     pub fn of(weather: Weather) -> Rain {
         let rate_mmph = STORM_MMPH * weather.rain() * weather.rain();
         Rain {
-            // Recommendation ITU-R P.1814, dB/km for light, from measurements in France.
+            // dB/km for light: Carbonneau and Wisely, Proc. SPIE 3232 (1998).
             laser_per_m: 1.076 * rate_mmph.powf(0.67) / 1000.0 * LN_10 / 10.0,
-            // Recommendation ITU-R P.838, dB/km for horizontal polarisation near 77 GHz.
+            // dB/km at 77 GHz, polarised horizontally, on a level way: the formula of Recommendation
+            // ITU-R P.838-3 gives 1.132 and 0.7177.
             radar_db_per_m: 1.13 * rate_mmph.powf(0.72) / 1000.0,
             scattered: STORM_SCATTERED * rate_mmph / STORM_MMPH,
         }

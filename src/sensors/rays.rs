@@ -1,10 +1,10 @@
-//! Whom a ray meets first: trees of boxes over the triangles of a town, and over those of all that
-//! moves.
+//! What a sensor can reach, and what its rays meet first: trees of boxes over the triangles of a
+//! town, and over those of all that moves.
 //!
 //! The tree of a town is built once, with time spent on its quality. What moves is few triangles,
 //! and of those only the bodies near a sensor count, so their tree is built anew at every instant.
 
-use std::time::Duration;
+use std::{f32::consts::PI, time::Duration};
 
 use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::{
@@ -17,15 +17,12 @@ use obvhs::{
 
 use crate::{
     scene::{
-        instant::{Body, Instant},
+        instant::{Body, Instant, LARGEST_BODY_M},
         mesh::{Material, Mesh, Triangle},
-        surroundings::Surroundings,
+        surroundings::{Surroundings, Tile},
     },
     world::reservation::ActorId,
 };
-
-/// No body reaches further from its origin than this, m.
-const LARGEST_BODY_M: f32 = 12.0;
 
 /// What a ray has met.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +31,6 @@ pub struct Hit {
     /// Unit vector that leaves the surface on the side of the ray; world frame.
     pub normal: Vec3,
     pub material: Material,
-    /// sRGB.
-    pub colour: [u8; 3],
     /// `None` for what stands.
     pub actor: Option<ActorId>,
     /// World frame, m/s.
@@ -43,7 +38,10 @@ pub struct Hit {
 }
 
 /// All that stands in a town, ready for rays.
-pub struct Standing(Tree);
+pub struct Standing {
+    tiles: Vec<Tile>,
+    tree: Tree,
+}
 
 impl Standing {
     pub fn new(surroundings: &Surroundings) -> Standing {
@@ -53,41 +51,86 @@ impl Standing {
             add(&tile.mesh, &Affine3A::IDENTITY, &mut corners);
             surfaces.extend(tile.mesh.triangles.iter().map(|triangle| Surface::of(triangle, None)));
         }
-        Standing(Tree::new(&corners, &surfaces, BvhBuildParams::slow_build()))
+        let tree = Tree::new(&corners, &surfaces, BvhBuildParams::slow_build());
+        Standing { tiles: surroundings.tiles.clone(), tree }
     }
 }
 
 /// All that a sensor can reach at one instant.
+#[derive(Clone, Copy)]
 pub struct Reach<'a> {
     standing: &'a Standing,
     bodies: &'a [Body],
-    moving: Tree,
+    place_m: Vec3,
+    range_m: f32,
 }
 
 impl<'a> Reach<'a> {
-    /// What stands, and the bodies that come within `range_m` of a place.
+    /// What stands, and the bodies, within `range_m` of a place.
     pub fn new(
         standing: &'a Standing,
         instant: &'a Instant,
         place_m: Vec3,
         range_m: f32,
     ) -> Reach<'a> {
-        let mut corners = Vec::new();
-        let mut surfaces = Vec::new();
-        let reach_m = range_m + LARGEST_BODY_M;
-        for (index, body) in instant.bodies.iter().enumerate() {
-            let origin_m: Vec3 = body.world_from_body.translation.into();
-            if origin_m.distance_squared(place_m) > reach_m * reach_m {
-                continue;
-            }
-            add(&body.mesh, &body.world_from_body, &mut corners);
-            let triangles = body.mesh.triangles.iter();
-            surfaces.extend(triangles.map(|triangle| Surface::of(triangle, Some((index, body)))));
-        }
-        let moving = Tree::new(&corners, &surfaces, BvhBuildParams::fastest_build());
-        Reach { standing, bodies: &instant.bodies, moving }
+        Reach { standing, bodies: &instant.bodies, place_m, range_m }
     }
 
+    /// What stands, in tiles that come within the range.
+    pub fn tiles(&self) -> impl Iterator<Item = &'a Tile> {
+        let Reach { place_m, range_m, .. } = *self;
+        self.standing.tiles.iter().filter(move |tile| {
+            let gap_m = (tile.low_m - place_m).max(place_m - tile.high_m).max(Vec3::ZERO);
+            gap_m.length_squared() <= range_m * range_m
+        })
+    }
+
+    /// The bodies that may come within the range, with their places in the instant.
+    pub fn bodies(&self) -> impl Iterator<Item = (usize, &'a Body)> {
+        let (place_m, reach_m) = (self.place_m, self.range_m + LARGEST_BODY_M);
+        self.bodies.iter().enumerate().filter(move |(_, body)| {
+            let origin_m: Vec3 = body.world_from_body.translation.into();
+            origin_m.distance_squared(place_m) <= reach_m * reach_m
+        })
+    }
+
+    /// Ready for rays from the place, in any direction.
+    pub fn rays(&self) -> Rays<'a> {
+        self.rays_towards(Vec3::X, PI)
+    }
+
+    /// Ready for rays from near the place that turn from a direction (unit length) by `most_rad` at
+    /// most.
+    pub fn rays_towards(&self, direction: Vec3, most_rad: f32) -> Rays<'a> {
+        let mut corners = Vec::new();
+        let mut surfaces = Vec::new();
+        let place_m = self.place_m;
+        let may_be_met = |body: &Body| {
+            let way_m = Vec3::from(body.world_from_body.translation) - place_m;
+            // It, and the ray's beginning, lie within this.
+            let reach_m = 2.0 * LARGEST_BODY_M;
+            let distance_m = way_m.length();
+            distance_m < reach_m
+                || way_m.angle_between(direction) < most_rad + (reach_m / distance_m).asin()
+        };
+        for (index, body) in self.bodies().filter(|(_, body)| may_be_met(body)) {
+            add(&body.mesh, &body.world_from_body, &mut corners);
+            let triangles = body.mesh.triangles.iter();
+            surfaces.extend(triangles.map(|triangle| Surface::of(triangle, Some(index))));
+        }
+        let moving = Tree::new(&corners, &surfaces, BvhBuildParams::fastest_build());
+        Rays { standing: &self.standing.tree, bodies: self.bodies, moving }
+    }
+}
+
+/// What stands and what moves, for rays.
+pub struct Rays<'a> {
+    standing: &'a Tree,
+    bodies: &'a [Body],
+    moving: Tree,
+}
+
+impl Rays<'_> {
     /// What a ray meets first within `max_m`; `direction` is a unit vector, both in the world frame.
     pub fn hit(&self, origin_m: Vec3, direction: Vec3, max_m: f32) -> Option<Hit> {
         let mut ray = Ray::new(origin_m.into(), direction.into(), 0.0, max_m);
@@ -95,17 +138,24 @@ impl<'a> Reach<'a> {
         if let Some((range_m, _, _)) = moving {
             ray.tmax = range_m;
         }
-        let (range_m, out, surface) = self.standing.0.first(&ray).or(moving)?;
+        let (range_m, out, surface) = self.standing.first(&ray).or(moving)?;
         let out = if out.dot(ray.direction) > 0.0 { -out } else { out };
         let body = surface.body.map(|index| &self.bodies[index as usize]);
         Some(Hit {
             range_m,
             normal: out.normalize_or_zero().into(),
             material: surface.material,
-            colour: surface.colour,
             actor: body.map(|body| body.actor),
             velocity_mps: body.map_or(Vec3::ZERO, |body| body.velocity_mps.as_vec3()),
         })
+    }
+}
+
+/// The colour of a triangle, sRGB: of coachwork and jackets its body decides.
+pub fn colour(triangle: &Triangle, body: Option<&Body>) -> [u8; 3] {
+    match (triangle.material, body) {
+        (Material::Coachwork | Material::Jacket, Some(body)) => body.colour,
+        _ => triangle.colour,
     }
 }
 
@@ -113,19 +163,13 @@ impl<'a> Reach<'a> {
 #[derive(Clone, Copy)]
 struct Surface {
     material: Material,
-    colour: [u8; 3],
     /// Index of the body that it belongs to.
     body: Option<u32>,
 }
 
 impl Surface {
-    fn of(triangle: &Triangle, body: Option<(usize, &Body)>) -> Surface {
-        let colour = match (triangle.material, body) {
-            (Material::Coachwork | Material::Jacket, Some((_, body))) => body.colour,
-            _ => triangle.colour,
-        };
-        let body = body.map(|(index, _)| index as u32);
-        Surface { material: triangle.material, colour, body }
+    fn of(triangle: &Triangle, body: Option<usize>) -> Surface {
+        Surface { material: triangle.material, body: body.map(|index| index as u32) }
     }
 }
 

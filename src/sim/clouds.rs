@@ -1,6 +1,7 @@
 //! Returns of lidar and radar as packed points, little-endian.
 
 use crate::sensors::{
+    floats::nearest,
     lidar::LidarReturn,
     radar::{RadarReturn, direction},
 };
@@ -64,7 +65,7 @@ pub fn of_lidar(returns: &[LidarReturn], with_ring: bool) -> Packed {
     let mut cloud = Packed::new(fields, returns.len());
     for point in returns {
         let [x, y, z] = point.position_m;
-        cloud.put([x, y, z, point.intensity].map(|value| (value * 256.0).round() / 256.0));
+        cloud.put([x, y, z, point.intensity].map(|value| nearest(value * 256.0) as f32 / 256.0));
         if with_ring {
             cloud.data.extend_from_slice(&point.ring.to_le_bytes());
         }

@@ -99,14 +99,14 @@ pub fn objects(snapshot: &Snapshot) -> Vec<Object> {
     let vehicles = snapshot.vehicles.iter().map(|vehicle| Object {
         id: vehicle.id,
         kind: ObjectKind::Vehicle(vehicle.kind),
-        pose: middle(&vehicle.footprint, vehicle.ground_m, vehicle.height_m),
+        pose: middle(&vehicle.footprint, vehicle.ground_m, vehicle.climb, vehicle.height_m),
         size_m: (2.0 * vehicle.footprint.half_m).extend(vehicle.height_m),
         velocity_mps: vehicle.velocity_mps,
     });
     let walkers = snapshot.walkers.iter().map(|walker| Object {
         id: walker.id,
         kind: ObjectKind::Walker(walker.kind),
-        pose: middle(&walker.footprint, walker.ground_m, walker.kind.height_m()),
+        pose: middle(&walker.footprint, walker.ground_m, 0.0, walker.kind.height_m()),
         size_m: (2.0 * walker.footprint.half_m).extend(walker.kind.height_m()),
         velocity_mps: walker.velocity_mps,
     });
@@ -115,7 +115,12 @@ pub fn objects(snapshot: &Snapshot) -> Vec<Object> {
     vehicles.chain(walkers).filter(is_near).collect()
 }
 
-/// The middle of a box that stands on the ground.
-fn middle(footprint: &Footprint, ground_m: f64, height_m: f64) -> Pose {
-    Pose::new(footprint.centre_m.extend(ground_m + height_m / 2.0), footprint.forward)
+/// The middle of a box on ground that climbs along it.
+fn middle(footprint: &Footprint, ground_m: f64, climb: f64, height_m: f64) -> Pose {
+    let mut pose = Pose::new(footprint.centre_m.extend(ground_m), footprint.forward);
+    if climb != 0.0 {
+        pose.orientation *= DQuat::from_rotation_y(-climb.atan());
+    }
+    pose.position_m += pose.orientation * DVec3::new(0.0, 0.0, 0.5 * height_m);
+    pose
 }

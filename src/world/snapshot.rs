@@ -22,9 +22,12 @@ pub struct VehicleState {
     pub id: ActorId,
     pub kind: VehicleKind,
     pub footprint: Footprint,
-    /// Of the ground below it.
+    /// Of the ground half-way between its axles, and by how much that of the front axle is higher than
+    /// that of the rear one, over the way between them on the map.
     pub ground_m: f64,
+    pub climb: f64,
     pub height_m: f64,
+    /// On the map.
     pub velocity_mps: DVec2,
     pub acceleration_mps2: f64,
     /// Picks a colour, in [0, 1).
@@ -35,11 +38,13 @@ pub struct VehicleState {
 pub fn vehicle_states(streets: &Streets, traffic: &Traffic) -> Vec<VehicleState> {
     let state = |vehicle: &Vehicle| {
         let footprint = vehicle.footprint(streets);
+        let [front_m, rear_m] = vehicle.axles(streets).map(|axle| axle.height_m);
         VehicleState {
             id: vehicle.id,
             kind: vehicle.model.kind,
             footprint,
-            ground_m: vehicle.spot(streets, 0.0).height_m,
+            ground_m: 0.5 * (front_m + rear_m),
+            climb: (front_m - rear_m) / vehicle.wheelbase_m(),
             height_m: vehicle.height_m,
             velocity_mps: vehicle.velocity_mps(&footprint),
             acceleration_mps2: vehicle.acceleration_mps2,
@@ -123,20 +128,24 @@ impl Snapshot {
     pub fn towards(&self, next: &Snapshot, share: f64) -> Snapshot {
         let vehicles = self.vehicles.iter().zip(&next.vehicles);
         let walkers = self.walkers.iter().zip(&next.walkers);
+        let between = |a: f64, b: f64| a + (b - a) * share;
         Snapshot {
-            time_s: self.time_s + (next.time_s - self.time_s) * share,
+            time_s: between(self.time_s, next.time_s),
             ego: self.ego,
             ego_ground_m: self.ego_ground_m,
             vehicles: vehicles
                 .map(|(a, b)| VehicleState {
                     footprint: a.footprint.towards(&b.footprint, share),
+                    ground_m: between(a.ground_m, b.ground_m),
+                    climb: between(a.climb, b.climb),
                     ..*b
                 })
                 .collect(),
             walkers: walkers
                 .map(|(a, b)| WalkerState {
                     footprint: a.footprint.towards(&b.footprint, share),
-                    walked_m: a.walked_m + (b.walked_m - a.walked_m) * share,
+                    ground_m: between(a.ground_m, b.ground_m),
+                    walked_m: between(a.walked_m, b.walked_m),
                     ..*b
                 })
                 .collect(),

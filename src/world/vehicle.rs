@@ -236,11 +236,21 @@ impl Vehicle {
         Spot { position_m, ..on_lane }
     }
 
+    /// From axle to axle along its way, m.
+    pub fn wheelbase_m(&self) -> f64 {
+        2.0 * self.model.wheelbase * self.half_m.x
+    }
+
+    /// Where its front and its rear axle stand.
+    pub fn axles(&self, streets: &Streets) -> [Spot; 2] {
+        let half_m = 0.5 * self.wheelbase_m();
+        [self.spot(streets, half_m), self.spot(streets, -half_m)]
+    }
+
     /// What it covers of the ground: both axles are on the way, so that long vehicles cut corners
     /// as they do.
     pub fn footprint(&self, streets: &Streets) -> Footprint {
-        let half_m = self.model.wheelbase * self.half_m.x;
-        let (front, rear) = (self.spot(streets, half_m), self.spot(streets, -half_m));
+        let [front, rear] = self.axles(streets);
         let forward = (front.position_m - rear.position_m).normalize_or(front.forward);
         let centre_m = (front.position_m + rear.position_m) / 2.0;
         Footprint { centre_m, forward, half_m: self.half_m }

@@ -25,7 +25,7 @@ fn tile(mesh: Mesh) -> Tile {
     let places = || mesh.vertices.iter().map(|vertex| vertex.position_m);
     let low_m = places().fold(Vec3::INFINITY, Vec3::min);
     let high_m = places().fold(Vec3::NEG_INFINITY, Vec3::max);
-    Tile { low_m, high_m, mesh }
+    Tile { low_m, high_m, mesh: mesh.into() }
 }
 
 /// A flat shape: its corners in the order that is counter-clockwise from outside.

@@ -75,6 +75,17 @@ fn the_readers_of_mcap_read_foxgloves_messages() {
 }
 
 #[test]
+fn foxgloves_own_package_defines_the_messages_as_the_log_does() {
+    let Some(found) = read_by("foxglove-sdk", "mcap_protobuf, foxglove", shared().foxglove())
+    else {
+        return;
+    };
+    check(&found, 14);
+    let same = found["same_definitions"].as_object().unwrap();
+    assert!(same.len() > 7 && same.values().all(|same| *same == true), "{same:?}");
+}
+
+#[test]
 fn the_readers_of_mcap_read_ros_2_messages() {
     let log = shared().record(&Shared::recipe(Encoding::Ros2, 1.2), "for-readers.mcap");
     let Some(found) = read_by("ros2", "mcap_ros2", &log) else { return };

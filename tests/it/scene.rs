@@ -1,7 +1,7 @@
 //! Towns and all that moves in them as triangles: where they should be, the right way round, the
 //! same every time.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use glam::{DVec2, DVec3, Vec3};
 use pmp::{
@@ -9,6 +9,7 @@ use pmp::{
     map::{opendrive::LaneKind, road_map::RoadMap},
     noise::{Noise, Purpose},
     scene::{
+        instant::Instant,
         mesh::{Material, Mesh},
         people::{GAITS, Look, person},
         shapes::{POSES, Shapes},
@@ -16,9 +17,12 @@ use pmp::{
     },
     towns::scenery::collection::Scenery,
     world::{
+        ego::Car,
         kind::{VEHICLES, VehicleKind, WalkerKind},
         paving::pave,
-        snapshot::{WalkerState, walker_states},
+        snapshot::{Snapshot, WalkerState, vehicle_states, walker_states},
+        streets::{Course, Lane, Streets},
+        traffic::Traffic,
         walkers::Walkers,
     },
 };
@@ -196,9 +200,11 @@ fn a_town_out_of_its_place_is_found_out() {
     let foreign = Surroundings::of(&towns()[0].map, &Scenery::derive(&towns()[0].map, 0));
     assert!(wrong_on_lanes(&towns()[1].map, &foreign).is_some());
     let mut turned = foreign;
-    turned.tiles.iter_mut().flat_map(|tile| &mut tile.mesh.triangles).for_each(|face| {
-        face.corners.swap(0, 1);
-    });
+    turned.tiles.iter_mut().flat_map(|tile| &mut Arc::make_mut(&mut tile.mesh).triangles).for_each(
+        |face| {
+            face.corners.swap(0, 1);
+        },
+    );
     assert!(upside_down(&turned).is_some());
 }
 
@@ -319,6 +325,44 @@ pub(crate) fn somebody(kind: WalkerKind, id: u32, speed_mps: f64, walked_m: f64)
         is_crossing: false,
         colour: 0.0,
     }
+}
+
+#[test]
+fn all_wheels_stand_on_a_slope() {
+    let (along, climb) = (DVec2::from_angle(0.7), 0.12);
+    let at = |s_m: f64| (along * s_m).extend(climb * s_m);
+    let course = Course::through(&[at(0.0), at(600.0)]);
+    let streets = Streets::new(vec![Lane::new("slope".into(), course, 3.5, 14.0)], Vec::new());
+    let mut noise = Noise::new(2, 0, Purpose::Traffic);
+    let actor = |id| Noise::of_actor(2, 0, id);
+    let traffic = Traffic::spawn(&streets, 16, DVec2::splat(1e4), 1.0, &mut noise, actor);
+    let snapshot = Snapshot {
+        time_s: 0.0,
+        ego: Car::default(),
+        ego_ground_m: 0.0,
+        vehicles: vehicle_states(&streets, &traffic),
+        walkers: Vec::new(),
+    };
+    let mut feet = 0;
+    for (body, state) in
+        Instant::of(&snapshot, &Shapes::new()).bodies.iter().zip(&snapshot.vehicles)
+    {
+        let s_m = state.footprint.centre_m.dot(along);
+        // Beyond its ends a lane goes on without its slope.
+        if !(8.0..592.0).contains(&s_m) {
+            continue;
+        }
+        for vertex in body.mesh.vertices.iter().filter(|vertex| vertex.position_m.z < 0.05) {
+            let place_m = body.world_from_body.transform_point3(vertex.position_m).as_dvec3();
+            let ground_m = climb * place_m.truncate().dot(along);
+            let above_m = place_m.z - ground_m - f64::from(vertex.position_m.z);
+            assert!(above_m.abs() < 0.02, "{:?}: {above_m} m above the ground", state.kind);
+            feet += 1;
+        }
+        let rise_mps = climb * state.velocity_mps.length();
+        assert!((body.velocity_mps.z - rise_mps).abs() < 1e-6);
+    }
+    assert!(feet > 100, "{feet}");
 }
 
 #[test]

@@ -1,9 +1,10 @@
 """What the official readers of MCAP find in a log of pmp's recorder.
 
-    python readers.py protobuf | ros2 LOG.mcap
+    python readers.py protobuf | foxglove-sdk | ros2 LOG.mcap
 
-Prints one JSON object. Every message is decoded by the definition that the log carries; nothing of pmp
-is used.
+Prints one JSON object. Every message is decoded by the definition that the log carries, or with
+foxglove-sdk, which has no reader of its own, Foxglove's messages by the definitions that the package
+carries; nothing of pmp is used.
 """
 
 import io
@@ -16,11 +17,45 @@ from PIL import Image
 
 
 def decoder(flavour):
-    if flavour == "protobuf":
-        from mcap_protobuf.decoder import DecoderFactory
-    else:
+    if flavour == "ros2":
         from mcap_ros2.decoder import DecoderFactory
+    else:
+        from mcap_protobuf.decoder import DecoderFactory
     return DecoderFactory()
+
+
+class BySdk:
+    """Decodes Foxglove's messages by the definitions of foxglove-sdk."""
+
+    def __init__(self):
+        # By name, whether the log's definition is the package's.
+        self.same = {}
+
+    def decoder_for(self, encoding, schema):
+        from foxglove import messages
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+        if encoding != "protobuf" or not schema.name.startswith("foxglove."):
+            return None
+        known = getattr(messages, schema.name.removeprefix("foxglove.")).get_schema()
+        files, said = (
+            {file.name: file for file in descriptor_pb2.FileDescriptorSet.FromString(data).file}
+            for data in (known.data, schema.data)
+        )
+        self.same[schema.name] = known.name == schema.name and files == said
+        pool = descriptor_pool.DescriptorPool()
+
+        def add(name):
+            file = files.pop(name, None)
+            if file is not None:
+                for other in file.dependency:
+                    add(other)
+                pool.Add(file)
+
+        for name in list(files):
+            add(name)
+        kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+        return kind.FromString
 
 
 def stamp_ns(message):
@@ -32,8 +67,10 @@ def stamp_ns(message):
 def main():
     flavour, path = sys.argv[1:]
     topics, pictures, clouds, odometry, boxes, steering = {}, [], [], [], [], []
+    sdk = BySdk()
+    decoders = [sdk, decoder(flavour)] if flavour == "foxglove-sdk" else [decoder(flavour)]
     with open(path, "rb") as file:
-        reader = make_reader(file, decoder_factories=[decoder(flavour)], validate_crcs=True)
+        reader = make_reader(file, decoder_factories=decoders, validate_crcs=True)
         for schema, channel, _, message in reader.iter_decoded_messages():
             kind = schema.name
             topics.setdefault(channel.topic, [kind, 0])[1] += 1
@@ -58,6 +95,7 @@ def main():
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
     print(json.dumps({
         "topics": topics,
+        "same_definitions": sdk.same,
         "metadata": metadata,
         "picture_sizes": sorted(set(pictures)),
         "cloud_points": [float(numpy.min(clouds)), float(numpy.max(clouds)), float(numpy.sum(clouds))],

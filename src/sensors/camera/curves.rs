@@ -2,17 +2,7 @@
 
 use glam::Vec3A;
 
-/// The lesser of two numbers; without the care that [`f32::min`] takes of what is none, which costs.
-#[inline]
-pub fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// The greater of two numbers.
-#[inline]
-pub fn most(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
+use crate::sensors::floats::{floor, least, most, split};
 
 /// 0 below `from`, 1 above `to`, smooth in between.
 #[inline]
@@ -29,24 +19,6 @@ pub fn fade(x: f32) -> f32 {
     let fourth = square * square;
     let eighth = fourth * fourth;
     eighth * eighth
-}
-
-/// Largest whole number that is not greater.
-#[inline]
-pub fn floor(value: f32) -> i32 {
-    let towards_zero = value as i32;
-    towards_zero - i32::from((towards_zero as f32) > value)
-}
-
-/// Floats of this size are whole: to add it rounds, quicker than any conversion.
-pub const WHOLE: f32 = (3 << 22) as f32;
-
-/// The whole number below, and what is left, in [0, 1]; for numbers within 4 million. A whole number
-/// itself may be seen as the end of the step before.
-#[inline]
-pub fn split(value: f32) -> (i32, f32) {
-    let rounded = (value - 0.5) + WHOLE;
-    (rounded.to_bits().wrapping_sub(WHOLE.to_bits()) as i32, value - (rounded - WHOLE))
 }
 
 /// Bars of one width, one at the start of each period.

@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::{curves::WHOLE, light::Light},
+    sensors::{camera::light::Light, floats::WHOLE},
 };
 
 /// Random numbers that are drawn once and used again from other places.
@@ -86,14 +86,18 @@ impl Sensor {
         for ((radiance, draws), bytes) in radiance.iter().zip(draws).zip(bytes) {
             let exposed = *radiance * light.exposure;
             let exposed = exposed.clamp(Vec3A::splat(darkest), Vec3A::splat(brightest));
-            let steps = exposed.to_array().map(|exposed| (exposed.to_bits() >> shift) - first);
-            let bright = Vec3A::from_array(steps.map(|step| self.tones[step as usize % TONES]));
+            let tone = |exposed: f32| {
+                let step = (exposed.to_bits() >> shift).wrapping_sub(first);
+                self.tones[step as usize % TONES]
+            };
+            let bright = Vec3A::new(tone(exposed.x), tone(exposed.y), tone(exposed.z));
             // Less of it where there is light.
             let noise = (Vec3A::splat(1.3) - bright) * light.noise * Vec3A::from_array(*draws);
             let value = (bright * 255.0 + noise).clamp(Vec3A::ZERO, Vec3A::splat(255.0));
             // The last bits are those of the nearest whole number.
             let rounded = value + Vec3A::splat(WHOLE);
-            *bytes = rounded.to_array().map(|rounded| rounded.to_bits() as u8);
+            let [r, g, b] = rounded.to_array();
+            *bytes = [r.to_bits() as u8, g.to_bits() as u8, b.to_bits() as u8];
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::{Affine3A, Mat3, Vec2, Vec3};
 
 use crate::{
     scene::{
-        instant::{Body, Instant},
+        instant::{Body, Instant, LARGEST_BODY_M},
         mesh::{Material, Mesh, Vertex},
         surroundings::Surroundings,
     },
@@ -76,7 +76,8 @@ impl Facets {
         let Affine3A { matrix3, translation } = body.world_from_body;
         let growth =
             matrix3.x_axis.length().max(matrix3.y_axis.length()).max(matrix3.z_axis.length());
-        if !view.may_see_ball(translation.into(), growth * reach_m(&body.mesh)) {
+        let may_see = |reach_m: f32| view.may_see_ball(translation.into(), growth * reach_m);
+        if !may_see(LARGEST_BODY_M) || !may_see(reach_m(&body.mesh)) {
             return;
         }
         let (rotation, shift) = view.camera_from_body(&body.world_from_body);
@@ -93,7 +94,7 @@ impl Facets {
         view: &View,
         mesh: &Mesh,
         body: Option<(u32, [u8; 3])>,
-        from_eye_m: &dyn Fn(&Vertex) -> Vec3,
+        from_eye_m: &impl Fn(&Vertex) -> Vec3,
         onto: &mut Visibility,
     ) {
         self.bounds.clear();
@@ -111,7 +112,7 @@ impl Facets {
                 continue;
             }
             let vertices = [&mesh.vertices[a], &mesh.vertices[b], &mesh.vertices[c]];
-            let at_m = vertices.map(from_eye_m);
+            let at_m = [from_eye_m(vertices[0]), from_eye_m(vertices[1]), from_eye_m(vertices[2])];
             let normal = (at_m[1] - at_m[0]).cross(at_m[2] - at_m[0]);
             let painted = matches!(triangle.material, Material::Coachwork | Material::Jacket);
             let colour = body.filter(|_| painted).map_or(triangle.colour, |(_, colour)| colour);

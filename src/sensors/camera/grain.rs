@@ -2,7 +2,7 @@
 
 use crate::{
     noise::{Noise, Purpose},
-    sensors::camera::curves::{most, split},
+    sensors::floats::{most, split},
 };
 
 /// Texels along a side of the finest level, a power of two.

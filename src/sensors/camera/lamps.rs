@@ -8,9 +8,9 @@ use crate::{
         mesh::{Material, Mesh},
         surroundings::Surroundings,
     },
-    sensors::camera::{
-        curves::{floor, smooth},
-        light::Light,
+    sensors::{
+        camera::{curves::smooth, light::Light},
+        floats::floor,
     },
 };
 

@@ -5,9 +5,9 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::sensors::camera::{
-    curves::{self, WHOLE, least},
-    view::{NEAR_M, View},
+use crate::sensors::{
+    camera::view::{NEAR_M, View},
+    floats::{self, WHOLE, least},
 };
 
 /// No facet: the sky.
@@ -203,12 +203,12 @@ impl Visibility {
                 // All bits where it is nearer: a choice that takes no branch.
                 let chosen = 0_u32.wrapping_sub(u32::from(mine > *nearness));
                 *facet = (this & chosen) | (*facet & !chosen);
-                *nearness = curves::most(mine, *nearness);
+                *nearness = floats::most(mine, *nearness);
             }
         } else {
             for (i, nearness) in nearness.iter_mut().enumerate() {
                 let mine = mine(i);
-                *nearness = curves::most(mine, *nearness);
+                *nearness = floats::most(mine, *nearness);
             }
         }
     }
@@ -244,7 +244,7 @@ impl Edge {
 /// The first pixel of a row or column whose centre lies at or beyond a place; `end` if none does.
 #[inline]
 fn first_centre(place_px: f32, end: usize) -> usize {
-    let from = least(curves::most(place_px - 0.5, 0.0), end as f32);
+    let from = least(floats::most(place_px - 0.5, 0.0), end as f32);
     let rounded = from + WHOLE;
     let whole = rounded.to_bits().wrapping_sub(WHOLE.to_bits());
     (whole + u32::from(rounded - WHOLE < from)) as usize

@@ -1,5 +1,7 @@
 //! Shadows: of the sun, by looking from it, and below bodies, where little of the sky is seen.
 
+use std::sync::Arc;
+
 use glam::{Affine3A, Mat3, Vec3, Vec3A};
 
 use crate::{
@@ -8,19 +10,28 @@ use crate::{
         mesh::{Material, Mesh, Vertex},
         surroundings::Surroundings,
     },
-    sensors::camera::{
-        curves::split,
-        light::{Light, luminance},
-        raster::{Bounds, Visibility},
+    sensors::{
+        camera::{
+            light::{Light, luminance},
+            raster::{Bounds, Visibility},
+        },
+        floats::split,
     },
 };
 
-/// Texels of the shadow map along a side, and their size, m.
-const SIDE: usize = 512;
+/// Size of the texels of the shadow map, m, and how many lie on either side of what it is asked for.
 const TEXEL_M: f32 = 0.18;
+const REACH: usize = 256;
+
+/// The map stays where it is while its middle moves within so many texels, so that what stands is drawn
+/// once for many pictures.
+const STEP: usize = 128;
+
+/// Texels along a side.
+const SIDE: usize = 2 * REACH + STEP;
 
 /// What stands further from the middle of the map throws no shadow onto it, m.
-const CASTERS_M: f32 = 100.0;
+const CASTERS_M: f32 = 112.0;
 
 /// What reaches further from its origin does so outside the map, m.
 const BODY_M: f32 = 7.0;
@@ -32,7 +43,7 @@ const BIAS_M: f32 = 0.12;
 const DEPTH_M: f32 = 1000.0;
 
 /// The area that the map covers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Area {
     /// Rows: across, up, towards the sun.
     sun_from_world: Mat3,
@@ -45,16 +56,26 @@ struct Area {
 #[derive(Clone, Debug)]
 pub struct Shadows {
     map: Visibility,
+    standing: Standing,
     places_px: Vec<Vec3>,
     bounds: Vec<Bounds>,
     /// `None` where no sun shines.
     area: Option<Area>,
 }
 
+/// The map of what stands, as it was drawn last, and of what.
+#[derive(Clone, Debug, Default)]
+struct Standing {
+    nearness: Vec<f32>,
+    area: Option<Area>,
+    meshes: Vec<Arc<Mesh>>,
+}
+
 impl Default for Shadows {
     fn default() -> Shadows {
         Shadows {
             map: Visibility::flat(SIDE, SIDE),
+            standing: Standing::default(),
             places_px: Vec::new(),
             bounds: Vec::new(),
             area: None,
@@ -69,9 +90,9 @@ impl Area {
         let world_from_sun = Mat3::from_cols(across, sun.cross(across), sun);
         let sun_from_world = world_from_sun.transpose();
         // Texels keep their places in the world, so edges do not crawl.
-        let middle = sun_from_world * middle_m;
-        let snapped = (middle.truncate() / TEXEL_M).floor() * TEXEL_M;
-        let middle_m = world_from_sun * snapped.extend(middle.z);
+        let step_m = STEP as f32 * TEXEL_M;
+        let snapped = ((sun_from_world * middle_m / step_m).floor() + 0.5) * step_m;
+        let middle_m = world_from_sun * snapped;
         let to_texels = Mat3::from_diagonal(Vec3::new(1.0 / TEXEL_M, 1.0 / TEXEL_M, 1.0));
         let scaled = to_texels * sun_from_world;
         let middle = Vec3::new(SIDE as f32 / 2.0, SIDE as f32 / 2.0, DEPTH_M);
@@ -108,11 +129,22 @@ impl Shadows {
     ) {
         self.area = (luminance(light.sun) > 0.1).then(|| Area::new(light, middle_m));
         let Some(area) = self.area else { return };
-        self.map.clear();
-        for tile in &surroundings.tiles {
-            if area.may_be_shaded_by(tile.low_m, tile.high_m) {
-                self.draw_mesh(&tile.mesh, &area.map_from_world);
-            }
+        let tiles = surroundings.tiles.iter();
+        let casters = tiles.filter(|tile| area.may_be_shaded_by(tile.low_m, tile.high_m));
+        let meshes: Vec<&Arc<Mesh>> = casters.map(|tile| &tile.mesh).collect();
+        // No other mesh can have the place of one that is held.
+        let is_same = |(held, now): (&Arc<Mesh>, &&Arc<Mesh>)| Arc::ptr_eq(held, now);
+        let is_drawn = self.standing.area == Some(area)
+            && self.standing.meshes.len() == meshes.len()
+            && self.standing.meshes.iter().zip(&meshes).all(is_same);
+        if is_drawn {
+            self.map.nearness.copy_from_slice(&self.standing.nearness);
+        } else {
+            self.map.clear();
+            meshes.iter().for_each(|mesh| self.draw_mesh(mesh, &area.map_from_world));
+            self.standing.nearness.clone_from(&self.map.nearness);
+            self.standing.meshes = meshes.into_iter().cloned().collect();
+            self.standing.area = Some(area);
         }
         for body in &instant.bodies {
             let centre_m = Vec3::from(body.world_from_body.translation);

@@ -4,10 +4,13 @@ use glam::{Vec2, Vec3A};
 
 use crate::{
     scene::mesh::Material,
-    sensors::camera::{
-        curves::{Bars, Stretch, linear, lot, smooth, split},
-        facets::Facet,
-        grain::Grain,
+    sensors::{
+        camera::{
+            curves::{Bars, Stretch, linear, lot, smooth},
+            facets::Facet,
+            grain::Grain,
+        },
+        floats::split,
     },
 };
 

@@ -35,6 +35,17 @@ struct Knot {
     mirrored: Vec3A,
 }
 
+/// Two pixels that a place mirrors, and the share of the second.
+#[derive(Clone, Copy)]
+struct Met {
+    pixel: usize,
+    other: usize,
+    share: f32,
+}
+
+/// Those of a run, with what they mirror.
+type Knots = Vec<(Knot, Option<Met>)>;
+
 /// What the water on the ground does to a picture.
 pub struct Water<'a> {
     pub view: &'a View,
@@ -54,6 +65,7 @@ impl Water<'_> {
         // Only of a level camera do mirrored rays stay in their column.
         let axes = &view.world_from_camera;
         let is_level = axes.x_axis.z.abs() < LEVEL && axes.z_axis.z.abs() < LEVEL;
+        let mut knots = Knots::new();
         for row in 0..view.height {
             let row = view.row(row);
             let start = row.number * view.width;
@@ -69,7 +81,7 @@ impl Water<'_> {
             while let Some(dry) = facets[from..].iter().position(|facet| is_wet(*facet)) {
                 from += dry;
                 let wet = facets[from..].iter().take_while(|facet| is_wet(**facet)).count();
-                self.mirror(&row, from..from + wet, is_level, radiance);
+                self.mirror(&row, from..from + wet, is_level, &mut knots, radiance);
                 from += wet;
             }
         }
@@ -87,18 +99,35 @@ impl Water<'_> {
     }
 
     /// Add what the pixels of a run mirror.
-    fn mirror(&self, row: &Row, run: Range<usize>, is_level: bool, radiance: &mut [Vec3A]) {
+    fn mirror(
+        &self,
+        row: &Row,
+        run: Range<usize>,
+        is_level: bool,
+        knots: &mut Knots,
+        radiance: &mut [Vec3A],
+    ) {
         let light = self.light;
         let start = row.number * self.view.width;
         let nearness = &self.visibility.nearness[start..];
         let eye_m = Vec3A::from(self.view.eye_m);
         let film = 0.42 * light.wetness;
         let last = run.end - 1;
+        knots.clear();
+        knots.extend(run.clone().step_by(KNOTS_PX).map(|column| self.knot(row, column, is_level)));
+        if !(last - run.start).is_multiple_of(KNOTS_PX) {
+            knots.push(self.knot(row, last, is_level));
+        }
+        // What is mirrored lies all over the memory: asked for at once, it comes at once.
+        for (knot, met) in knots.iter_mut() {
+            if let Some(Met { pixel, other, share }) = *met {
+                knot.mirrored = radiance[pixel].lerp(radiance[other], share);
+            }
+        }
         let mut from = run.start;
-        let mut here = self.knot(row, from, is_level, radiance);
-        loop {
+        for (place, (here, _)) in knots.iter().enumerate() {
+            let (there, _) = knots.get(place + 1).unwrap_or(&knots[place]);
             let to = (from + KNOTS_PX).min(last);
-            let there = if to > from { self.knot(row, to, is_level, radiance) } else { here };
             let per_pixel = 1.0 / (to - from).max(1) as f32;
             // The last pixel of a run stands for itself.
             for column in from..to.max(from + 1) {
@@ -117,34 +146,31 @@ impl Water<'_> {
                 let pixel = &mut radiance[start + column];
                 *pixel = *pixel * (1.0 - 0.6 * share_mirrored) + mirrored * share_mirrored;
             }
-            if to == from {
-                return;
-            }
-            (from, here) = (to, there);
+            from = to;
         }
     }
 
-    fn knot(&self, row: &Row, column: usize, is_level: bool, radiance: &[Vec3A]) -> Knot {
+    /// What is at a pixel, with the sky mirrored, and what is mirrored instead of it.
+    fn knot(&self, row: &Row, column: usize, is_level: bool) -> (Knot, Option<Met>) {
         let (view, light) = (self.view, self.light);
         let nearness = self.visibility.nearness[row.number * view.width + column];
         let from_eye_m = row.ray(column) / nearness;
         let distance_m = from_eye_m.length();
         let above_m = -from_eye_m.z;
         if above_m < 0.1 {
-            return Knot { water: Vec3A::ZERO, mirrored: light.horizon };
+            return (Knot { water: Vec3A::ZERO, mirrored: light.horizon }, None);
         }
         let facing = above_m / distance_m;
         let grazing = 1.0 - facing;
         let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing;
         let footprint_m = distance_m / (view.focal_px.x * facing.sqrt());
         let rough = 1.0 - 0.85 * self.puddle(Vec3A::from(view.eye_m) + from_eye_m, footprint_m);
-        let met =
-            is_level.then(|| self.march(row.number, column, nearness, above_m, rough, radiance));
-        let sky = || light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing));
-        Knot {
+        let knot = Knot {
             water: Vec3A::new(fade(light.haze_per_m * distance_m), fresnel, footprint_m),
-            mirrored: met.flatten().unwrap_or_else(sky),
-        }
+            mirrored: light.horizon.lerp(light.zenith, smooth(0.0, 0.8, facing)),
+        };
+        let met = is_level.then(|| self.march(row.number, column, nearness, above_m, rough));
+        (knot, met.flatten())
     }
 
     /// How much of a puddle there is at a place on the ground, world frame, in [0, 1].
@@ -165,8 +191,7 @@ impl Water<'_> {
         nearness: f32,
         above_m: f32,
         rough: f32,
-        radiance: &[Vec3A],
-    ) -> Option<Vec3A> {
+    ) -> Option<Met> {
         let view = self.view;
         let below_horizon = row as f32 + 0.5 - view.centre_px.y;
         let rise = 2.0 * below_horizon;
@@ -177,12 +202,12 @@ impl Water<'_> {
             let share = (step as f32 - dice * 0.9) / STEPS as f32;
             let at = row as f32 - rise * share;
             if at < 0.0 {
-                return last;
+                return last.map(|pixel| Met { pixel, other: pixel, share: 0.0 });
             }
             let place = at as usize * view.width + column;
             let there = (at + 0.5 - view.centre_px.y) * per_row;
             let ray_nearness = 0.5 * (there + nearness);
-            last = Some(radiance[place]);
+            last = Some(place);
             if self.visibility.nearness[place] > ray_nearness * 1.01 {
                 break;
             }
@@ -190,7 +215,7 @@ impl Water<'_> {
         // A rough film smears what it mirrors, up and down.
         let smear = (rise * 0.45 * dice * rough) as usize;
         let other = (row as f32 - rise).max(0.0) as usize + smear;
-        let other = radiance[other.min(row) * view.width + column];
-        last.map(|seen| seen.lerp(other, 0.35 * rough))
+        let other = other.min(row) * view.width + column;
+        last.map(|pixel| Met { pixel, other, share: 0.35 * rough })
     }
 }
