@@ -7,7 +7,7 @@ use std::{path::Path, process::Command};
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use pmp::{
     dataset::picture::{
-        self, jpeg,
+        self, Content, Decoded, jpeg,
         rgb::{MAX_PIXELS, Rgb},
         scale::{self, Area},
     },
@@ -66,13 +66,20 @@ fn unscaled() -> CameraRule {
 }
 
 fn decode(data: &[u8]) -> Result<Rgb, String> {
-    picture::decode(&Picture::Compressed { data }, &unscaled()).map(|decoded| decoded.rgb)
+    picture::decode(&Picture::Compressed { data }, &unscaled()).map(rgb_of)
+}
+
+fn rgb_of(decoded: Decoded) -> Rgb {
+    match decoded.content {
+        Content::Rgb(rgb) => rgb,
+        other => panic!("not every pixel was decoded: {other:?}"),
+    }
 }
 
 fn raw(width: usize, height: usize, encoding: &str, row_bytes: usize, data: &[u8]) -> Rgb {
     let encoding = Encoding::of(encoding).unwrap();
     let pixels = Pixels { width, height, encoding, row_bytes, endian: Endian::Little, data };
-    picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap().rgb
+    rgb_of(picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap())
 }
 
 fn psnr_db(a: &[u8], b: &[u8]) -> f64 {
@@ -195,7 +202,7 @@ fn samples_of_any_layout_become_red_green_blue() {
     let data = [255, 254, 0, 128];
     let pixels =
         Pixels { width: 2, height: 1, encoding, row_bytes: 4, endian: Endian::Big, data: &data };
-    let rgb = picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap().rgb;
+    let rgb = rgb_of(picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap());
     assert_eq!(rgb.data, [255, 255, 255, 0, 0, 0], "65278 and 128 of 65535");
 }
 
