@@ -3,7 +3,7 @@
 //! ```text
 //! samples -> motion -> ego (pose, velocity) -> future, route, control, conditions   labels
 //!            odometry, /tf, dead_reckoning, gnss (heading); world, base_frame
-//!         -> align (grid) -> senses (picture, ralidar) -> shown -> drive (frames) -> columns -> shard
+//!         -> align (grid) -> senses (picture, ralidar) -> shown -> drive (frames) -> columns (halves) -> shard
 //!            ahead: what frames need, made during the scan and kept in stock
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
@@ -35,6 +35,7 @@ pub mod shown;
 pub mod drive;
 pub mod ahead;
 pub mod columns;
+pub mod halves;
 pub mod shard;
 pub mod split;
 pub mod account;

@@ -1,6 +1,6 @@
 //! Lidar and radar onto the picture: the nearest return of each pixel (paper §III.C2).
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use half::f16;
 
 use crate::{
@@ -29,7 +29,7 @@ pub fn lidar_pixels(
     camera: &Camera,
 ) -> Result<LidarPixels> {
     let cloud = Cloud::new(message)?;
-    let [x, y, z] = cloud.xyz()?;
+    let xyz = cloud.xyz()?;
     let camera_from_points = match &cloud.frame_from_points {
         Some(pose) => camera_from_sensor.then(pose),
         None => *camera_from_sensor,
@@ -40,8 +40,7 @@ pub fn lidar_pixels(
         camera_from_points.position_m,
     );
     let mut nearest = Nearest::new(camera);
-    for point in cloud.points() {
-        let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
+    for point_m in cloud.positions(xyz) {
         let camera_m = camera_from_points.transform_point3(point_m);
         nearest.add(camera_m, camera_m);
     }

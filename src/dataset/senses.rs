@@ -202,16 +202,21 @@ impl Senses {
                 });
                 Sensed::Picture(stored.map_err(|why| (Reason::ImageDamaged, why)))
             }
-            Signal::Lidar => Sensed::Lidar(project(&self.lidar).and_then(|(topic, camera, pose)| {
-                let pixels = topic.decode(message).and_then(|m| lidar_pixels(&m, &pose, camera));
-                pixels.map_err(|error| error.to_string())
-            })),
-            Signal::Radar => Sensed::Radar(project(&self.radar).and_then(|(topic, camera, pose)| {
-                let pixels = topic.decode(message).and_then(|message| {
-                    radar_pixels(topic.kind, &message, &self.radar_rule, &pose, camera)
-                });
-                pixels.map_err(|error| error.to_string())
-            })),
+            Signal::Lidar => {
+                Sensed::Lidar(project(&self.lidar).and_then(|(topic, camera, pose)| {
+                    let pixels =
+                        topic.decode(message).and_then(|m| lidar_pixels(&m, &pose, camera));
+                    pixels.map_err(|error| error.to_string())
+                }))
+            }
+            Signal::Radar => {
+                Sensed::Radar(project(&self.radar).and_then(|(topic, camera, pose)| {
+                    let pixels = topic.decode(message).and_then(|message| {
+                        radar_pixels(topic.kind, &message, &self.radar_rule, &pose, camera)
+                    });
+                    pixels.map_err(|error| error.to_string())
+                }))
+            }
         }
     }
 

@@ -161,11 +161,7 @@ impl Log {
     /// # Errors
     ///
     /// As [`Log::scan`].
-    pub fn visit(
-        path: &Path,
-        on_bytes: &dyn Fn(u64),
-        visitor: &mut dyn Visitor,
-    ) -> Result<Log> {
+    pub fn visit(path: &Path, on_bytes: &dyn Fn(u64), visitor: &mut dyn Visitor) -> Result<Log> {
         let file = File::open(path).map_err(Error::io("open", path))?;
         let size_bytes = file.metadata().map_err(Error::io("examine", path))?.len();
         let mut log = Log {

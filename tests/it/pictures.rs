@@ -354,41 +354,83 @@ proptest! {
 fn a_shrunk_decode_is_close_to_the_full_one_and_in_its_place() {
     // Odd sizes: the last column and row of the shrunk picture stand for less than the others.
     let rgb = scene(1281, 723);
-    let file = jpeg_of(&rgb, SamplingFactor::F_2_2, false);
-    let full = jpeg::decode(&file).unwrap();
+    let grey: Vec<u8> = rgb.data.iter().step_by(3).copied().collect();
+    let mut grey_jpeg = Vec::new();
+    Encoder::new(&mut grey_jpeg, 92).encode(&grey, 1281, 723, ColorType::Luma).unwrap();
+    let mut in_runs = Vec::new();
+    let mut encoder = Encoder::new(&mut in_runs, 92);
+    encoder.set_restart_interval(7);
+    encoder.encode(&rgb.data, 1281, 723, ColorType::Rgb).unwrap();
+    let files = [
+        ("4:2:0", jpeg_of(&rgb, SamplingFactor::F_2_2, false)),
+        ("4:2:2", jpeg_of(&rgb, SamplingFactor::F_2_1, false)),
+        ("4:4:0", jpeg_of(&rgb, SamplingFactor::F_1_2, false)),
+        ("4:4:4", jpeg_of(&rgb, SamplingFactor::F_1_1, false)),
+        ("grey", grey_jpeg),
+        ("with restarts", in_runs),
+        ("progressive", jpeg_of(&rgb, SamplingFactor::F_2_2, true)),
+    ];
+    let cropped = |x, y, width, height| CameraRule {
+        crop: Some(Crop { x, y, width, height }),
+        ..CameraRule::default()
+    };
     for (rule, reduction) in [
         (CameraRule::default(), 2),
+        (CameraRule { width: 320, height: 180, ..CameraRule::default() }, 4),
         (CameraRule { width: 160, height: 90, ..CameraRule::default() }, 8),
-        (
-            CameraRule {
-                crop: Some(Crop { x: 101, y: 33, width: 1001, height: 555 }),
-                ..CameraRule::default()
-            },
-            1,
-        ),
-        (
-            CameraRule {
-                crop: Some(Crop { x: 3, y: 1, width: 1277, height: 719 }),
-                ..CameraRule::default()
-            },
-            2,
-        ),
+        (cropped(101, 33, 1001, 555), 1),
+        (cropped(3, 1, 1277, 719), 2),
+        (CameraRule { width: 601, height: 251, ..CameraRule::default() }, 1),
     ] {
-        let decoded = picture::decode(&Picture::Compressed { data: &file }, &rule).unwrap();
-        let shrinks = jpeg::REDUCTIONS.len() > 1;
-        assert_eq!(decoded.reduction, if shrinks { reduction } else { 1 });
-        assert_eq!((decoded.width, decoded.height), (1281, 723));
-        let stored = decode(&decoded.stored(&rule).unwrap()).unwrap();
-        let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width: 1281, height: 723 });
-        let area = Area {
-            x: crop.x as f64,
-            y: crop.y as f64,
-            width: crop.width as f64,
-            height: crop.height as f64,
-        };
-        let expected = scale::resize(&full, area, rule.width, rule.height).unwrap();
-        let close_db = psnr_db(&stored.data, &expected.data);
-        assert!(close_db > 35.0, "{close_db} dB");
+        for (name, file) in &files {
+            let full = jpeg::decode(file).unwrap();
+            let decoded = picture::decode(&Picture::Compressed { data: file }, &rule).unwrap();
+            match &decoded.content {
+                Content::Planes(planes) => assert_eq!(planes.luma.pixels, [reduction; 2], "{name}"),
+                _ => assert!(reduction == 1 || *name == "progressive", "{name}"),
+            }
+            assert_eq!((decoded.width, decoded.height), (1281, 723));
+            let stored = decode(&decoded.stored(&rule).unwrap()).unwrap();
+            let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width: 1281, height: 723 });
+            let area = Area {
+                x: crop.x as f64,
+                y: crop.y as f64,
+                width: crop.width as f64,
+                height: crop.height as f64,
+            };
+            let expected = scale::resize(&full, area, rule.width, rule.height).unwrap();
+            let close_db = psnr_db(&stored.data, &expected.data);
+            assert!(close_db > 35.0, "{name} at 1/{reduction}: {close_db} dB");
+        }
+    }
+}
+
+#[test]
+fn a_jpeg_that_lacks_data_inside_is_damaged_although_it_ends_as_it_should() {
+    let rgb = scene(320, 240);
+    let mut in_runs = Vec::new();
+    let mut encoder = Encoder::new(&mut in_runs, 92);
+    encoder.set_restart_interval(5);
+    encoder.encode(&rgb.data, 320, 240, ColorType::Rgb).unwrap();
+    let kept = CameraRule { width: 320, height: 240, ..CameraRule::default() };
+    let shrunk = CameraRule { width: 160, height: 120, ..CameraRule::default() };
+    let restart = |two: &[u8]| matches!(two, [0xff, 0xd0..=0xd7]);
+    let run = in_runs.windows(2).position(restart).unwrap();
+    let next = run + 2 + in_runs[run + 2..].windows(2).position(restart).unwrap();
+    let without_run = [&in_runs[..run], &in_runs[next..]].concat();
+    let mut files = vec![without_run];
+    for file in [jpeg_of(&rgb, SamplingFactor::F_2_2, false), in_runs] {
+        for (cut, at) in [(1, 0.3), (2, 0.9), (7, 0.6), (100, 0.4), (1000, 0.7)] {
+            let at = (at * file.len() as f64) as usize;
+            files.push([&file[..at], &file[at + cut..]].concat());
+        }
+        assert!(decode(&file).unwrap().width == 320);
+    }
+    for (number, file) in files.iter().enumerate() {
+        for rule in [&kept, &shrunk, &unscaled()] {
+            let decoded = picture::decode(&Picture::Compressed { data: file }, rule);
+            assert!(decoded.is_err(), "file {number}, stored as {} pixels", rule.width);
+        }
     }
 }
 

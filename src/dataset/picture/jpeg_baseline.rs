@@ -5,7 +5,7 @@
 //! that fill up what is missing do not tell.
 
 use crate::dataset::picture::{
-    jpeg_codes::{Bits, Codes, PADDING},
+    jpeg_codes::{Bits, Codes, END, Look, PADDING},
     jpeg_header::Header,
     jpeg_segments::{START_OF_SCAN, segments},
 };
@@ -159,8 +159,7 @@ impl<'a> Baseline<'a> {
                             let dc = &mut previous[index];
                             read_block(&mut bits, component, dc, block)
                                 .ok_or("damaged data of a JPEG")?;
-                            let at =
-                                (column * component.across + x, row * component.down + y);
+                            let at = (column * component.across + x, row * component.down + y);
                             done(block, index, at.0, at.1);
                         }
                     }
@@ -199,39 +198,54 @@ fn read_block(
     block.set(0, *previous);
     let mut at = 1;
     while at < COEFFICIENTS {
-        // Enough for two codes of 16 bits with numbers of 10.
+        // Enough for two looks, each of 26 bits at most.
         bits.fill();
         for _ in 0..2 {
             let look = bits.look(&component.ac);
-            let value = if let Some(zeros) = look.zeros() {
-                at += zeros;
-                bits.take(look)
+            if look.first == 0 {
+                at += rare(bits, component, look, at, block)?;
             } else {
-                let symbol = bits.symbol(&component.ac, look)?;
-                match (symbol >> 4, symbol & 15) {
-                    (0, 0) => return Some(()),
-                    (15, 0) => {
-                        at += 16;
-                        continue;
-                    }
-                    (_, 0 | 11..) => return None,
-                    (zeros, size) => {
-                        at += usize::from(zeros);
-                        bits.number(u32::from(size))
-                    }
+                let [first, second] = bits.numbers(look);
+                at += usize::from(look.first);
+                block.set((at - 1) % COEFFICIENTS, first);
+                if at >= COEFFICIENTS {
+                    // What is seen behind it is of the next block.
+                    bits.skip_first(look);
+                    break;
                 }
-            };
-            if at >= COEFFICIENTS {
-                return None;
+                at += usize::from(look.second);
+                block.set((at - 1) % COEFFICIENTS, second);
+                bits.skip_both(look);
             }
-            block.set(at, value);
-            at += 1;
-            if at == COEFFICIENTS {
-                return Some(());
+            if at >= COEFFICIENTS {
+                break;
             }
         }
     }
-    None
+    let is_whole = at == COEFFICIENTS || (END..END + COEFFICIENTS).contains(&at);
+    is_whole.then_some(())
+}
+
+/// Codes that are long, or tell of 16 zeros: how far they lead; `None` for what is no code.
+// Within its caller, whose bits would otherwise lie in memory all the time.
+#[inline(always)]
+fn rare(
+    bits: &mut Bits,
+    component: &Component,
+    look: Look,
+    at: usize,
+    block: &mut impl Block,
+) -> Option<usize> {
+    let symbol = bits.symbol(&component.ac, look)?;
+    match (usize::from(symbol >> 4), symbol & 15) {
+        (0, 0) => Some(END),
+        (15, 0) => Some(16),
+        (_, 0 | 11..) => None,
+        (zeros, size) => {
+            block.set((at + zeros) % COEFFICIENTS, bits.number(u32::from(size)));
+            Some(zeros + 1)
+        }
+    }
 }
 
 /// The runs of a scan's data between its restarts.
@@ -303,7 +317,7 @@ fn read_codes(mut body: &[u8], into: &mut [[Option<Codes>; 4]; 2]) -> Option<()>
         let (class, slot) = (usize::from(about >> 4), usize::from(about & 15));
         let (counts, rest) = rest.split_first_chunk()?;
         let len = counts.iter().map(|count| usize::from(*count)).sum();
-        let codes = Codes::new(counts, rest.get(..len)?)?;
+        let codes = Codes::new(counts, rest.get(..len)?, class == 1)?;
         *into.get_mut(class)?.get_mut(slot)? = Some(codes);
         body = &rest[len..];
     }

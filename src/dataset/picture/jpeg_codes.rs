@@ -1,8 +1,8 @@
 //! The Huffman codes of a baseline JPEG, and the bits that are written in them (ITU-T T.81, annex F).
 //!
 //! Reading is a chain: where a code begins is known when the one before it has been read, and this
-//! is what decoding a JPEG spends most of its time on. So the chain is kept short, one look into a
-//! table for a code and the number behind it, and free of branches that depend on the data.
+//! is what decoding a JPEG spends most of its time on. So the chain is kept short: one look into a
+//! table for two codes and the numbers behind them, free of branches that depend on the data.
 
 /// Bits that are looked at together.
 const LOOK_BITS: u32 = 11;
@@ -10,23 +10,57 @@ const LOOK_BITS: u32 = 11;
 /// Zero bytes that [`Bits`] wants behind the data, so that it can read ahead.
 pub const PADDING: usize = 16;
 
-/// What the next bits say, in the bytes of a number, lowest first: how many bits the code and the
-/// number behind it have, how many the code has alone (0: more than are looked at), how many the
-/// number has (0 for such a code, too), and the symbol, which says that as well, and 16 x the
-/// zeros before it.
+/// Added to the place in a block by the code that ends it.
+pub const END: usize = 128;
+
+/// What the next bits say: up to two coefficients.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Look(u32);
+pub struct Look {
+    /// How far the first one leads in the block: the zeros before it and itself, or [`END`]; 0
+    /// where the code is longer than the look, tells of zeros alone, or is none.
+    pub first: u8,
+    /// The same for the second one; 0 where it was not seen.
+    pub second: u8,
+    /// Bits of the first code, and of the number behind it.
+    first_code: u8,
+    first_number: u8,
+    /// Bits up to the second number, and of it.
+    to_second: u8,
+    second_number: u8,
+    /// Bits of both.
+    bits: u8,
+    /// The symbol of the first code; of use where its code has bits.
+    symbol: u8,
+}
 
 impl Look {
-    fn new(symbol: u8, code_bits: u8) -> Look {
-        let number_bits = symbol & 15;
-        Look(u32::from_le_bytes([code_bits + number_bits, code_bits, number_bits, symbol]))
+    /// What a code says alone.
+    fn one(symbol: u8, code_bits: u8) -> Look {
+        let (zeros, number_bits) = (symbol >> 4, symbol & 15);
+        let first = match (zeros, number_bits) {
+            (0, 0) => END as u8,
+            (_, 0 | 11..) => 0,
+            _ => zeros + 1,
+        };
+        let bits = code_bits + number_bits;
+        Look {
+            first,
+            first_code: code_bits,
+            first_number: number_bits,
+            bits,
+            symbol,
+            ..Look::default()
+        }
     }
 
-    /// Zeros before a number of one bit or more; `None` where no such code was seen.
-    #[inline(always)]
-    pub fn zeros(self) -> Option<usize> {
-        (self.0 & 0xff_0000 != 0).then_some((self.0 >> 28) as usize)
+    /// With what is seen behind it.
+    fn and(self, next: Look) -> Look {
+        let to_second = self.bits + next.first_code;
+        if self.first_number == 0 || next.first == 0 || u32::from(to_second) > LOOK_BITS {
+            return self;
+        }
+        let bits = self.bits + next.bits;
+        Look { second: next.first, to_second, second_number: next.first_number, bits, ..self }
     }
 }
 
@@ -43,10 +77,10 @@ pub struct Codes {
 
 impl Codes {
     /// A table as a `DHT` segment has it: how many codes there are of 1 ... 16 bits, and the
-    /// symbols that they stand for.
+    /// symbols that they stand for; `in_pairs` where a look may see two of them.
     ///
     /// `None` if there are more codes than so many bits can tell apart.
-    pub fn new(counts: &[u8; 16], listed: &[u8]) -> Option<Codes> {
+    pub fn new(counts: &[u8; 16], listed: &[u8], in_pairs: bool) -> Option<Codes> {
         let mut symbols = [0; 256];
         symbols.get_mut(..listed.len())?.copy_from_slice(listed);
         let mut looks = Box::new([Look::default(); 1 << LOOK_BITS]);
@@ -61,7 +95,7 @@ impl Codes {
                 }
                 if let Some(rest_bits) = LOOK_BITS.checked_sub(length) {
                     let from = (code << rest_bits) as usize;
-                    let look = Look::new(symbol, length as u8);
+                    let look = Look::one(symbol, length as u8);
                     looks[from..from + (1 << rest_bits)].fill(look);
                 }
                 code += 1;
@@ -69,6 +103,13 @@ impl Codes {
             }
             ends[length as usize] = code << (16 - length);
             code <<= 1;
+        }
+        if in_pairs {
+            let alone = looks.clone();
+            for (at, look) in looks.iter_mut().enumerate() {
+                // What is not known of the bits behind the look is not asked for.
+                *look = look.and(alone[(at << look.bits.min(16)) % alone.len()]);
+            }
         }
         Some(Codes { looks, ends, places, symbols })
     }
@@ -102,16 +143,16 @@ impl<'d> Bits<'d> {
     #[inline(always)]
     pub fn fill(&mut self) {
         if let Some(eight) = self.data.get(self.at..).and_then(|rest| rest.first_chunk()) {
-            self.window |= u64::from_be_bytes(*eight) >> self.count;
+            self.window |= u64::from_be_bytes(*eight) >> (self.count & 63);
         }
-        self.at += ((63 - self.count) >> 3) as usize;
+        self.at += ((63 - (self.count & 63)) >> 3) as usize;
         self.count |= 56;
     }
 
     #[inline(always)]
     pub fn skip(&mut self, bits: u32) {
         self.window <<= bits;
-        self.count -= bits;
+        self.count = self.count.wrapping_sub(bits);
     }
 
     #[inline(always)]
@@ -119,23 +160,31 @@ impl<'d> Bits<'d> {
         codes.looks[(self.window >> (64 - LOOK_BITS)) as usize]
     }
 
-    /// The number that a look has seen a code for, with one bit or more; code and number are taken.
+    /// The first number that a look has seen a code for, and the second, 0 where there is none.
     #[inline(always)]
-    pub fn take(&mut self, look: Look) -> i32 {
-        let [_, code_bits, number_bits, _] = look.0.to_le_bytes();
-        let number = number(self.window << (code_bits & 63), u32::from(number_bits));
-        self.window <<= look.0 & 63;
-        self.count = self.count.wrapping_sub(look.0 & 63);
-        number
+    pub fn numbers(&self, look: Look) -> [i32; 2] {
+        let at = |from: u8, bits: u8| number(self.window << (from & 63), u32::from(bits & 15));
+        [at(look.first_code, look.first_number), at(look.to_second, look.second_number)]
+    }
+
+    /// Go on behind both.
+    #[inline(always)]
+    pub fn skip_both(&mut self, look: Look) {
+        self.skip(u32::from(look.bits) & 63);
+    }
+
+    /// Go on behind the first.
+    #[inline(always)]
+    pub fn skip_first(&mut self, look: Look) {
+        self.skip(u32::from(look.first_code + look.first_number) & 63);
     }
 
     /// The symbol of the next code, which a look has seen; `None` if there is no such code.
     #[inline(always)]
     pub fn symbol(&mut self, codes: &Codes, look: Look) -> Option<u8> {
-        let [_, code_bits, _, symbol] = look.0.to_le_bytes();
-        if code_bits > 0 {
-            self.skip(u32::from(code_bits));
-            return Some(symbol);
+        if look.first_code > 0 {
+            self.skip(u32::from(look.first_code) & 63);
+            return Some(look.symbol);
         }
         let next = (self.window >> 48) as u32;
         let length = (LOOK_BITS as usize + 1..=16).find(|length| next < codes.ends[*length])?;
@@ -147,18 +196,15 @@ impl<'d> Bits<'d> {
     /// The next number of `bits` bits, 0 ... 15.
     #[inline(always)]
     pub fn number(&mut self, bits: u32) -> i32 {
-        if bits == 0 {
-            return 0;
-        }
         let number = number(self.window, bits);
         self.skip(bits);
         number
     }
 }
 
-/// The number in the first 1 ... 15 bits; those whose first bit is 0 are negative (T.81, F.2.2.1).
+/// The number in the first 0 ... 15 bits; those whose first bit is 0 are negative (T.81, F.2.2.1).
 #[inline(always)]
 fn number(window: u64, bits: u32) -> i32 {
     let is_positive = (window as i64 >> 63) as i32;
-    (window >> (64 - bits)) as i32 - (!is_positive & ((1 << bits) - 1))
+    (window >> 1 >> (63 - bits)) as i32 - (!is_positive & ((1 << bits) - 1))
 }

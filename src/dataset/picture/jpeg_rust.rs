@@ -1,8 +1,6 @@
 //! JPEG in Rust alone: decoded by zune-jpeg, encoded by jpeg-encoder.
 
-use jpeg_encoder::{
-    ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor,
-};
+use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use zune_jpeg::{
     JpegDecoder,
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
