@@ -4,7 +4,7 @@
 //! Which messages a drive's frames need is known only when all of the log has been read. But after
 //! its first chunks it can mostly be told: the topics, where sensors sit, and when the grid begins.
 //! So the drive is opened on what has been read so far, and what its ticks would take is made as it
-//! comes by. A message is taken when the one after it is known, since that may be nearer to a tick.
+//! comes by. Where the next message may be nearer to a tick, its data is held until that is known.
 //!
 //! Nothing depends on that guess but time: [`Stock`] gives out only what would be made again.
 
@@ -68,6 +68,15 @@ struct Neighbours {
     before_ns: Option<i64>,
     own_ns: i64,
     after_ns: Option<i64>,
+}
+
+impl Neighbours {
+    /// As if the next one came after half of the time that has passed since the last one: most are
+    /// needed then, too, or not needed at all.
+    fn with_next_soon(self) -> Neighbours {
+        let gap_ns = self.own_ns.saturating_sub(self.before_ns.unwrap_or(self.own_ns));
+        Neighbours { after_ns: Some(self.own_ns.saturating_add(gap_ns / 2)), ..self }
+    }
 }
 
 impl<'c> Ahead<'c> {
@@ -171,15 +180,16 @@ impl<'c> Ahead<'c> {
                 continue;
             }
             let is_last = at + 1 == samples.len();
-            if self.at_once == 1 && !is_last {
+            let is_sure = !is_last || guess.needs(signal, &neighbours(at).with_next_soon());
+            if self.at_once == 1 && is_sure {
                 let (pose, sensed) = guess.sense(signal, sample.stamp_ns, bytes);
                 self.stock.add(sample.value, &guess.senses, pose, &sensed)?;
                 continue;
             }
             let needed = Needed { signal, sample: sample.clone(), data: bytes.to_vec() };
-            match is_last {
-                true => drop(self.held.insert(topic.to_string(), needed)),
-                false => self.waiting.push(needed),
+            match is_sure {
+                true => self.waiting.push(needed),
+                false => drop(self.held.insert(topic.to_string(), needed)),
             }
         }
         Ok(())

@@ -52,8 +52,9 @@ pub fn column_chunk(
     repetition.write(&mut body);
     definition.write(&mut body);
     for half in [0, 1] {
-        let values = lists.iter().flatten().copied().flatten();
-        body.extend(values.map(|value| value.to_le_bytes()[half]));
+        for list in lists.iter().flatten() {
+            body.extend(list.iter().map(|value| value.to_le_bytes()[half]));
+        }
     }
     let compressed = zstd::bulk::compress(&body, zstd_level)
         .map_err(|error| ParquetError::External(Box::new(error)))?;

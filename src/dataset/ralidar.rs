@@ -13,7 +13,7 @@ use crate::{
         signals::{Kind, Pose},
         value::Struct,
     },
-    projection::{Camera, Nearest},
+    projection::{Camera, NEAR_M, Nearest},
 };
 
 /// Lidar returns of a cloud on the picture.
@@ -39,8 +39,14 @@ pub fn lidar_pixels(
         camera_from_points.rotation,
         camera_from_points.position_m,
     );
+    let (depth, ahead_m) = (camera_from_points.matrix3.row(2), camera_from_points.translation.z);
     let mut nearest = Nearest::new(camera);
     for point_m in cloud.positions(xyz) {
+        // Half of a turn lies behind the camera, and one coordinate tells.
+        let depth_m = depth.x * point_m.x + depth.y * point_m.y + depth.z * point_m.z + ahead_m;
+        if depth_m.is_nan() || depth_m <= NEAR_M {
+            continue;
+        }
         let camera_m = camera_from_points.transform_point3(point_m);
         nearest.add(camera_m, camera_m);
     }

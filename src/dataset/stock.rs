@@ -174,11 +174,22 @@ impl Stock {
 }
 
 fn put_pixels(bytes: &mut Vec<u8>, pixels: &[u32]) {
-    bytes.extend(pixels.iter().flat_map(|pixel| pixel.to_le_bytes()));
+    for (pixel, bytes) in pixels.iter().zip(more(bytes, pixels.len())) {
+        *bytes = pixel.to_le_bytes();
+    }
 }
 
 fn put_halves(bytes: &mut Vec<u8>, halves: &[f16]) {
-    bytes.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
+    for (half, bytes) in halves.iter().zip(more(bytes, halves.len())) {
+        *bytes = half.to_le_bytes();
+    }
+}
+
+/// Room for so many numbers of `N` bytes more.
+fn more<const N: usize>(bytes: &mut Vec<u8>, count: usize) -> &mut [[u8; N]] {
+    let from = bytes.len();
+    bytes.resize(from + N * count, 0);
+    bytes[from..].as_chunks_mut().0
 }
 
 /// The pixels at the beginning of bytes that have so many half floats for each of them behind.

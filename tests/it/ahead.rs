@@ -34,8 +34,7 @@ fn served(log: &Path, at_once: usize) -> (Stock, [Served; 3]) {
     let mut ahead = Ahead::new(&profile, RATE_HZ, folder.path(), at_once).unwrap();
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "the file has a name");
     let mut on_chunk = |scanned: &Scanned, chunk, data: &[u8]| ahead.chunk(scanned, chunk, data);
-    let followed =
-        Recording::scan_followed(log, &profile.clock, &|_| (), &mut on_chunk).unwrap();
+    let followed = Recording::scan_followed(log, &profile.clock, &|_| (), &mut on_chunk).unwrap();
     let stock = Arc::new(ahead.finish().unwrap());
     let mut served: [Served; 3] = Default::default();
     assert_eq!(plain.len(), followed.len());
@@ -134,7 +133,11 @@ fn a_wrong_guess_costs_no_frame() {
     for drive in [
         DriveLog { is_out_of_order: true, ..DriveLog::default() },
         DriveLog { has_header_stamps: false, ..DriveLog::default() },
-        DriveLog { camera_gap_s: Some((1.0, 2.0)), ego_gap_s: Some((3.0, 3.5)), ..DriveLog::default() },
+        DriveLog {
+            camera_gap_s: Some((1.0, 2.0)),
+            ego_gap_s: Some((3.0, 3.5)),
+            ..DriveLog::default()
+        },
     ] {
         served(&write(folder.path(), &drive.messages()), 1);
     }
