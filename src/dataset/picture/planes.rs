@@ -68,6 +68,7 @@ impl Planes {
     }
 }
 
+/// First the rows, then the columns: of fewer rows, since columns are what takes the time.
 fn resize_into(
     plane: &Plane,
     area: Area,
@@ -75,18 +76,31 @@ fn resize_into(
     height: usize,
     into: &mut [u8],
 ) -> Result<(), String> {
-    let said = |error: &dyn std::fmt::Display| error.to_string();
-    let (source_width, source_height) = (plane.width as u32, plane.height as u32);
-    let source = ImageRef::new(source_width, source_height, &plane.data, PixelType::U8)
-        .map_err(|error| said(&error))?;
-    let mut target = Image::from_slice_u8(width as u32, height as u32, into, PixelType::U8)
-        .map_err(|error| said(&error))?;
     let [across, down] = plane.pixels.map(|pixels| pixels as f64);
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Box)).crop(
-        area.x / across,
-        area.y / down,
-        area.width / across,
-        area.height / down,
-    );
-    Resizer::new().resize(&source, &mut target, &options).map_err(|error| said(&error))
+    let mut rows = vec![0; plane.width * height];
+    let all_columns = (0.0, plane.width as f64);
+    let kept_rows = (area.y / down, area.height / down);
+    let size = (plane.width, plane.height);
+    resize_part(&plane.data, size, (all_columns, kept_rows), &mut rows, (plane.width, height))?;
+    let columns = (area.x / across, area.width / across);
+    let size = (plane.width, height);
+    resize_part(&rows, size, (columns, (0.0, height as f64)), into, (width, height))
+}
+
+/// Scale some columns and rows, each from where and how many.
+fn resize_part(
+    source: &[u8],
+    (source_width, source_height): (usize, usize),
+    ((x, columns), (y, rows)): ((f64, f64), (f64, f64)),
+    into: &mut [u8],
+    (width, height): (usize, usize),
+) -> Result<(), String> {
+    let source = ImageRef::new(source_width as u32, source_height as u32, source, PixelType::U8)
+        .map_err(|error| error.to_string())?;
+    let mut target = Image::from_slice_u8(width as u32, height as u32, into, PixelType::U8)
+        .map_err(|error| error.to_string())?;
+    let options = ResizeOptions::new()
+        .resize_alg(ResizeAlg::Convolution(FilterType::Box))
+        .crop(x, y, columns, rows);
+    Resizer::new().resize(&source, &mut target, &options).map_err(|error| error.to_string())
 }
