@@ -3,7 +3,8 @@
 //! The parquet crate makes a counted piece of shared memory of every half float on its way into a
 //! file, and a frame has twenty thousand. Here a column of a row group is one page, written as the
 //! format has it (<https://parquet.apache.org/docs/file-format/data-pages/>): the repetition and
-//! definition levels, then the values with their bytes split, under zstd.
+//! definition levels, then the values, under zstd. With their bytes split they would be a tenth
+//! smaller, and DuckDB 2.0 does not read that.
 
 use half::f16;
 use parquet::{
@@ -51,9 +52,11 @@ pub fn column_chunk(
     let mut body = Vec::new();
     repetition.write(&mut body);
     definition.write(&mut body);
-    for half in [0, 1] {
-        for list in lists.iter().flatten() {
-            body.extend(list.iter().map(|value| value.to_le_bytes()[half]));
+    for list in lists.iter().flatten() {
+        let from = body.len();
+        body.resize(from + 2 * list.len(), 0);
+        for (value, bytes) in list.iter().zip(body[from..].as_chunks_mut().0) {
+            *bytes = value.to_le_bytes();
         }
     }
     let compressed = zstd::bulk::compress(&body, zstd_level)
@@ -61,7 +64,7 @@ pub fn column_chunk(
     let page = Page::DataPage {
         buf: compressed.into(),
         num_values: u32::try_from(num_values)?,
-        encoding: Encoding::BYTE_STREAM_SPLIT,
+        encoding: Encoding::PLAIN,
         def_level_encoding: Encoding::RLE,
         rep_level_encoding: Encoding::RLE,
         statistics: None,
@@ -72,7 +75,7 @@ pub fn column_chunk(
     let bytes = Bytes::from(bytes.into_inner()?);
     let zstd = parquet::basic::ZstdLevel::try_new(zstd_level)?;
     let metadata = ColumnChunkMetaData::builder(column)
-        .set_encodings(vec![Encoding::RLE, Encoding::BYTE_STREAM_SPLIT])
+        .set_encodings(vec![Encoding::PLAIN, Encoding::RLE])
         .set_compression(Compression::ZSTD(zstd))
         .set_num_values(num_values as i64)
         .set_total_compressed_size(written.compressed_size as i64)

@@ -2,7 +2,7 @@
 //!
 //! 64 rows a row group (about 4.7 MB with lidar), so that shuffled reading by group touches
 //! little; pictures stored as they are, since JPEG does not compress again; lidar and radar as
-//! delta-coded pixels and byte-split half floats under zstd, a fifth of their plain size.
+//! delta-coded pixels and half floats under zstd.
 
 use std::{fs::File, ops::Range, path::Path};
 

@@ -14,7 +14,8 @@ use crate::dataset::picture::{
 
 /// Decode.
 ///
-/// Data that lacks within, with the end in its place, is not noticed here (it is by libjpeg-turbo).
+/// Data that lacks within, with the end in its place, is not noticed here: of a baseline picture
+/// [`Baseline::check`](crate::dataset::picture::jpeg_baseline::Baseline::check) tells.
 ///
 /// # Errors
 ///
