@@ -3,8 +3,8 @@
 //! The parquet crate makes a counted piece of shared memory of every half float on its way into a
 //! file, and a frame has twenty thousand. Here a column of a row group is one page, written as the
 //! format has it (<https://parquet.apache.org/docs/file-format/data-pages/>): the repetition and
-//! definition levels, then the values, under zstd. With their bytes split they would be a tenth
-//! smaller, and DuckDB 2.0 does not read that.
+//! definition levels, then the values, under zstd. With their bytes split they would take
+//! less, a twentieth of a dataset, and DuckDB 2.0 does not read that.
 
 use half::f16;
 use parquet::{

@@ -18,6 +18,10 @@ use crate::{
     },
 };
 
+/// Hears of a chunk when it has been scanned: what is known by then, its number among the segments
+/// of the log, and its data.
+pub type OnChunk<'f> = dyn FnMut(&Scanned, u32, &[u8]) -> Result<()> + 'f;
+
 impl Recording {
     /// Scan a log: one recording, and another one from each place on where its clocks jump back
     /// (see [`jumps`]).
@@ -30,7 +34,7 @@ impl Recording {
     }
 
     /// The same; `on_bytes` hears how many bytes it has gone through so far, and `on_chunk` of every
-    /// chunk: what is known after it, its number among the segments of the log, and its data.
+    /// chunk.
     ///
     /// # Errors
     ///
@@ -39,7 +43,7 @@ impl Recording {
         path: &Path,
         clock: &ClockRule,
         on_bytes: &dyn Fn(u64),
-        on_chunk: &mut dyn FnMut(&Scanned, u32, &[u8]) -> Result<()>,
+        on_chunk: &mut OnChunk,
     ) -> Result<Vec<Recording>> {
         let mut following = Following { builder: Builder::new(clock), on_chunk };
         let log = Log::visit(path, on_bytes, &mut following)?;
@@ -71,7 +75,7 @@ impl Scanned<'_> {
 
 struct Following<'c> {
     builder: Builder<'c>,
-    on_chunk: &'c mut dyn FnMut(&Scanned, u32, &[u8]) -> Result<()>,
+    on_chunk: &'c mut OnChunk<'c>,
 }
 
 impl Visitor for Following<'_> {
