@@ -168,37 +168,42 @@ fn brown(x: f64, y: f64, r2: f64, radial: f64, p1: f64, p2: f64) -> [f64; 2] {
 /// The nearest return of each pixel: of a lidar's, a radar's, in a log or simulated.
 pub struct Nearest<'c, T> {
     camera: &'c Camera,
-    /// For each pixel one more than the index of its return; 0 where there is none.
-    by_pixel: Vec<u32>,
+    /// Pixel, then index of the return: a few thousand numbers, which are faster to sort than a
+    /// table of all pixels is to clear.
+    hits: Vec<u64>,
     /// Squared distance, and what the return says.
     returns: Vec<(f64, T)>,
 }
 
 impl<'c, T: Copy> Nearest<'c, T> {
     pub fn new(camera: &'c Camera) -> Self {
-        let by_pixel = vec![0; camera.width * camera.height];
-        Nearest { camera, by_pixel, returns: Vec::new() }
+        Nearest { camera, hits: Vec::new(), returns: Vec::new() }
     }
 
     /// A return at a point of the optical frame; NaNs fall off the picture. Of two equally near
     /// returns the first stays.
+    #[inline]
     pub fn add(&mut self, point_m: DVec3, says: T) {
         let Some(pixel) = self.camera.pixel(point_m.to_array()) else { return };
-        let here = (point_m.length_squared(), says);
-        let slot = &mut self.by_pixel[pixel as usize];
-        match slot.checked_sub(1) {
-            None => {
-                self.returns.push(here);
-                *slot = self.returns.len() as u32;
-            }
-            Some(at) if here.0 < self.returns[at as usize].0 => self.returns[at as usize] = here,
-            Some(_) => {}
-        }
+        self.hits.push(u64::from(pixel) << 32 | self.returns.len() as u64);
+        self.returns.push((point_m.length_squared(), says));
     }
 
     /// Ascending by pixel.
-    pub fn finish(self) -> impl Iterator<Item = (u32, T)> {
-        let occupied = (0..).zip(self.by_pixel).filter(|(_, slot)| *slot > 0);
-        occupied.map(move |(pixel, slot)| (pixel, self.returns[slot as usize - 1].1))
+    pub fn finish(mut self) -> impl Iterator<Item = (u32, T)> {
+        self.hits.sort();
+        let Nearest { hits, returns, .. } = self;
+        let mut at = 0;
+        std::iter::from_fn(move || {
+            let pixel = hits.get(at)? >> 32;
+            let mut nearest = &returns[*hits.get(at)? as u32 as usize];
+            at += 1;
+            while let Some(hit) = hits.get(at).filter(|hit| *hit >> 32 == pixel) {
+                let other = &returns[*hit as u32 as usize];
+                nearest = if other.0 < nearest.0 { other } else { nearest };
+                at += 1;
+            }
+            Some((pixel as u32, nearest.1))
+        })
     }
 }

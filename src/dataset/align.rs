@@ -127,6 +127,11 @@ pub fn align(
     Some(grid)
 }
 
+/// From tick to tick.
+pub fn period_ns(rate_hz: f64) -> i64 {
+    (1e9 / rate_hz) as i64
+}
+
 /// Milliseconds to nanoseconds.
 pub fn nanos(milliseconds: f64) -> i64 {
     (milliseconds * 1e6) as i64

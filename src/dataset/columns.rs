@@ -18,6 +18,8 @@ use arrow::{
     error::ArrowError,
 };
 
+use half::f16;
+
 use crate::frame::{
     Command, Conditions, FUTURE_STEPS, Frame, Future, LidarPixels, ROUTE_POINTS, RadarPixels,
     RecordedAction, Route, RouteSource, Skew,
@@ -79,15 +81,25 @@ pub fn schema() -> SchemaRef {
     Arc::new(Schema::new_with_metadata(fields, HashMap::from([version])))
 }
 
+/// Half floats of a frame; `None` is null.
+pub type Halves = fn(&Frame) -> Option<&[f16]>;
+
+/// The columns of half floats.
+pub const HALVES: [(&str, Halves); 4] = [
+    ("lidar_x", |frame| frame.lidar.as_ref().map(|lidar| lidar.x.as_slice())),
+    ("lidar_y", |frame| frame.lidar.as_ref().map(|lidar| lidar.y.as_slice())),
+    ("lidar_z", |frame| frame.lidar.as_ref().map(|lidar| lidar.z.as_slice())),
+    ("radar_speed", |frame| frame.radar.as_ref()?.speed_mps.as_deref()),
+];
+
 /// Frames of one episode as columns, in the order of [`schema`].
 ///
 /// # Errors
 ///
 /// If Arrow finds the columns inconsistent, which would be a bug.
 pub fn to_columns(episode: &str, frames: &[Frame]) -> Result<RecordBatch, ArrowError> {
-    let lidar = |pick: fn(&LidarPixels) -> &[half::f16]| {
-        list::<Float16Type>(frames, |frame| frame.lidar.as_ref().map(pick))
-    };
+    let [lidar_x, lidar_y, lidar_z, radar_speed] =
+        HALVES.map(|(_, pick)| list::<Float16Type>(frames, pick));
     let text = |pick: fn(&Conditions) -> &Option<String>| -> ArrayRef {
         Arc::new(frames.iter().map(|f| pick(&f.conditions).as_deref()).collect::<StringArray>())
     };
@@ -108,11 +120,11 @@ pub fn to_columns(episode: &str, frames: &[Frame]) -> Result<RecordBatch, ArrowE
         Arc::new(stamps),
         Arc::new(frames.iter().map(|f| Some(f.image.as_slice())).collect::<BinaryArray>()),
         list::<UInt32Type>(frames, |frame| frame.lidar.as_ref().map(|l| l.pixel.as_slice())),
-        lidar(|lidar| &lidar.x),
-        lidar(|lidar| &lidar.y),
-        lidar(|lidar| &lidar.z),
+        lidar_x,
+        lidar_y,
+        lidar_z,
         list::<UInt32Type>(frames, |frame| frame.radar.as_ref().map(|r| r.pixel.as_slice())),
-        list::<Float16Type>(frames, |frame| frame.radar.as_ref()?.speed_mps.as_deref()),
+        radar_speed,
         fixed::<Float32Type>(frames, 2, |frame| &frame.velocity_mps),
         Arc::new(frames.iter().map(|f| Some(f.yaw_rad)).collect::<PrimitiveArray<Float64Type>>()),
         fixed::<Float64Type>(frames, 3, |frame| &frame.position_m),

@@ -1,6 +1,6 @@
 //! A log opened as a drive: its topics chosen, its grid laid, its frames ready to be made.
 
-use std::path::Path as FilePath;
+use std::{path::Path as FilePath, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,9 @@ use crate::{
         future::future,
         motion::Motion,
         route::{self, Path, command},
-        senses::{Senses, Shown},
+        senses::Senses,
+        shown::Shown,
+        stock::Stock,
     },
     drops::Reason,
     error::{Error, Result},
@@ -53,6 +55,8 @@ pub struct Drive {
     situations: Vec<Stamped<Situation>>,
     /// Camera, lidar and radar.
     pub senses: Senses,
+    /// What was made of messages while the log was scanned; nothing, unless it is set.
+    pub stock: Arc<Stock>,
 }
 
 /// What became of a tick.
@@ -143,7 +147,7 @@ impl Drive {
             radar: &radar_samples,
             control: &controls.samples,
         };
-        let period_ns = (1e9 / rate_hz) as i64;
+        let period_ns = align::period_ns(rate_hz);
         let grid = align::align(&signals, &profile.tolerance_ms, &profile.required, period_ns);
         let Some(grid) = grid else {
             let what = "there is no instant at which all required signals exist".to_string();
@@ -182,6 +186,7 @@ impl Drive {
             situations,
             senses,
             recording,
+            stock: Arc::default(),
         })
     }
 
@@ -203,7 +208,7 @@ impl Drive {
     ///
     /// If the log cannot be read any more.
     pub fn frames(&self, ticks: &[Tick]) -> Result<Vec<Made>> {
-        let shown = self.senses.show(&self.recording, ticks)?;
+        let shown = Shown::new(&self.senses, &self.recording, ticks, &self.stock)?;
         Ok(ticks.iter().map(|tick| self.frame(tick, &shown)).collect())
     }
 

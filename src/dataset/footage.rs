@@ -25,7 +25,7 @@ use crate::{
 pub type LeftOut = (Reason, String);
 
 /// A video that can be decoded.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct Footage {
     /// Of every packet by its place, what has to be decoded for it.
     chains: BTreeMap<Place, Result<Range<usize>, Broken>>,

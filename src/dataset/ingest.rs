@@ -14,6 +14,7 @@ use std::{
     cell::Cell,
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use rayon::prelude::*;
@@ -22,6 +23,7 @@ use crate::{
     atomic::{self, file_name, sha256_of_file},
     dataset::{
         account,
+        ahead::Ahead,
         claim::Claim,
         compaction::{compact, remove_leftovers},
         drive::Drive,
@@ -33,9 +35,10 @@ use crate::{
         plan::{Job, Plan, Share},
         record::{Parts, Source},
         shard::ShardRecord,
+        stock::Stock,
     },
     error::{Error, Result},
-    log::recording::Recording,
+    log::{recording::Recording, scan::Scanned},
 };
 
 /// Ingest logs into a dataset, on as many threads as the current rayon pool has.
@@ -181,9 +184,15 @@ fn ingest_file(
     on: &(dyn Fn(Step) + Sync),
 ) -> Result<LogRecord> {
     let on_bytes = |bytes| on(Step::Read { bytes });
-    let recordings = Recording::scan_telling(local.path(), &config.profile.clock, &on_bytes)?;
+    // Enough for all threads, where they are not at work on other logs.
+    let at_once = if blocks_at_once == 1 { 1 } else { 4 * blocks_at_once };
+    let mut ahead = Ahead::new(&config.profile, config.rate_hz, &claim.out, at_once)?;
+    let mut on_chunk = |scanned: &Scanned, chunk, data: &[u8]| ahead.chunk(scanned, chunk, data);
+    let clock = &config.profile.clock;
+    let recordings = Recording::scan_followed(local.path(), clock, &on_bytes, &mut on_chunk)?;
+    let stock = Arc::new(ahead.finish()?);
     let source = Source::new(local.path().to_path_buf(), recordings[0].log.sha256.clone());
-    source.ingest(recordings, claim, config, blocks_at_once, on)
+    source.ingest(recordings, &stock, claim, config, blocks_at_once, on)
 }
 
 impl Source {
@@ -211,6 +220,7 @@ impl Source {
     fn ingest(
         &self,
         recordings: Vec<Recording>,
+        stock: &Arc<Stock>,
         claim: &Claim,
         config: &IngestConfig,
         blocks_at_once: usize,
@@ -225,7 +235,8 @@ impl Source {
             let lost = account::without_frames(&recording);
             let id = parts.next_id(self);
             let write = || {
-                let drive = Drive::new(recording, &config.profile, config.rate_hz)?;
+                let mut drive = Drive::new(recording, &config.profile, config.rate_hz)?;
+                drive.stock = stock.clone();
                 on(Step::Opened { ticks: drive.grid.ticks.len() as u64 });
                 let on = |ticks, frames| on(Step::Made { ticks, frames });
                 Episode::write(&drive, &id, self.split, out, blocks_at_once, &on)

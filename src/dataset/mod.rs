@@ -3,7 +3,8 @@
 //! ```text
 //! samples -> motion -> ego (pose, velocity) -> future, route, control, conditions   labels
 //!            odometry, /tf, dead_reckoning, gnss (heading); world, base_frame
-//!         -> align (grid) -> senses (picture, ralidar) -> drive (frames) -> columns -> shard
+//!         -> align (grid) -> senses (picture, ralidar) -> shown -> drive (frames) -> columns (halves) -> shard
+//!            ahead: what frames need, made during the scan and kept in stock
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
 //! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, summary, inspect
@@ -30,9 +31,13 @@ pub mod footage;
 pub mod align;
 pub mod clocks;
 pub mod senses;
+pub mod stock;
+pub mod shown;
 pub mod drive;
+pub mod ahead;
 pub mod columns;
 pub mod traits;
+pub mod halves;
 pub mod shard;
 pub mod split;
 pub mod account;

@@ -1,6 +1,6 @@
 //! Lidar and radar onto the picture: the nearest return of each pixel (paper §III.C2).
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use half::f16;
 
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
         signals::{Kind, Pose},
         value::Struct,
     },
-    projection::{Camera, Nearest},
+    projection::{Camera, NEAR_M, Nearest},
 };
 
 /// Lidar returns of a cloud on the picture.
@@ -29,7 +29,7 @@ pub fn lidar_pixels(
     camera: &Camera,
 ) -> Result<LidarPixels> {
     let cloud = Cloud::new(message)?;
-    let [x, y, z] = cloud.xyz()?;
+    let xyz = cloud.xyz()?;
     let camera_from_points = match &cloud.frame_from_points {
         Some(pose) => camera_from_sensor.then(pose),
         None => *camera_from_sensor,
@@ -39,9 +39,14 @@ pub fn lidar_pixels(
         camera_from_points.rotation,
         camera_from_points.position_m,
     );
+    let (depth, ahead_m) = (camera_from_points.matrix3.row(2), camera_from_points.translation.z);
     let mut nearest = Nearest::new(camera);
-    for point in cloud.points() {
-        let point_m = DVec3::new(point.get(x), point.get(y), point.get(z));
+    for point_m in cloud.positions(xyz) {
+        // Half of a turn lies behind the camera, and one coordinate tells.
+        let depth_m = depth.x * point_m.x + depth.y * point_m.y + depth.z * point_m.z + ahead_m;
+        if depth_m.is_nan() || depth_m <= NEAR_M {
+            continue;
+        }
         let camera_m = camera_from_points.transform_point3(point_m);
         nearest.add(camera_m, camera_m);
     }

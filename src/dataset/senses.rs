@@ -1,15 +1,11 @@
 //! What the camera, the lidar and the radar of a drive show, brought down to what is stored.
 //!
-//! Pictures become JPEGs of one size, clouds become pixels of that picture: message by message, where
-//! they lie in the file, so that nothing large is kept.
-
-use std::collections::BTreeMap;
+//! Pictures become JPEGs of one size, clouds become pixels of that picture, each message for itself.
 
 use glam::{DQuat, DVec3};
 
 use crate::{
     dataset::{
-        align::Tick,
         footage::{Footage, LeftOut},
         motion::Motion,
         picture::{self, Decoded},
@@ -23,8 +19,8 @@ use crate::{
         image,
         mapping::Mapping,
         profile::{CameraRule, Profile},
-        reader::{Place, SegmentReader},
-        recording::{Recording, Series, Stamped, Topic, mapping_error},
+        reader::SegmentReader,
+        recording::{Recording, Series, Topic, mapping_error},
         signals::Pose,
         value::Struct,
     },
@@ -32,7 +28,7 @@ use crate::{
 };
 
 /// The sensors of a drive that frames take from.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct Senses {
     /// Intrinsics of the stored picture, where the log has them.
     pub stored_camera: Option<Camera>,
@@ -43,13 +39,13 @@ pub struct Senses {
     rule: CameraRule,
     radar_rule: RadarRule,
     /// Of a camera whose pictures depend on each other.
-    footage: Option<Footage>,
+    pub footage: Option<Footage>,
     lidar: Option<Sensor>,
     radar: Option<Sensor>,
 }
 
 /// A lidar or radar whose returns can be brought onto the picture.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 struct Sensor {
     topic: String,
     /// Rotates the camera's frame where its axes are those of a body (x forward).
@@ -57,57 +53,24 @@ struct Sensor {
 }
 
 /// Which signal a large message belongs to.
-#[derive(Clone, Copy, Debug)]
-enum Signal {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
     Camera,
     Lidar,
     Radar,
 }
 
+impl Signal {
+    pub const ALL: [Signal; 3] = [Signal::Camera, Signal::Lidar, Signal::Radar];
+}
+
 /// What a large message shows, or why it shows nothing.
 #[derive(Debug)]
-enum Sensed {
+pub enum Sensed {
     /// JPEG as stored.
     Picture(Result<Vec<u8>, LeftOut>),
     Lidar(Result<LidarPixels, String>),
     Radar(Result<RadarPixels, String>),
-}
-
-/// What some ticks' pictures and clouds show, by the place of their messages.
-pub struct Shown(BTreeMap<Place, Sensed>);
-
-impl Shown {
-    /// The stored picture of a tick.
-    ///
-    /// # Errors
-    ///
-    /// Why there is none.
-    pub fn picture(&self, tick: &Tick) -> Result<&[u8], LeftOut> {
-        match self.0.get(&tick.image.value) {
-            Some(Sensed::Picture(picture)) => picture.as_deref().map_err(LeftOut::clone),
-            _ => Err((Reason::ImageDamaged, "the decoder gave no picture for it".to_string())),
-        }
-    }
-
-    /// The lidar returns of a tick, or why they cannot be had; `None` where it has no cloud.
-    pub fn lidar(&self, tick: &Tick) -> Option<Result<&LidarPixels, &str>> {
-        match self.of(&tick.lidar)? {
-            Sensed::Lidar(pixels) => Some(pixels.as_ref().map_err(String::as_str)),
-            _ => None,
-        }
-    }
-
-    /// The radar returns of a tick, or why they cannot be had; `None` where it has no scan.
-    pub fn radar(&self, tick: &Tick) -> Option<Result<&RadarPixels, &str>> {
-        match self.of(&tick.radar)? {
-            Sensed::Radar(pixels) => Some(pixels.as_ref().map_err(String::as_str)),
-            _ => None,
-        }
-    }
-
-    fn of(&self, sample: &Option<Stamped<Place>>) -> Option<&Sensed> {
-        self.0.get(&sample.as_ref()?.value)
-    }
 }
 
 impl Senses {
@@ -180,79 +143,89 @@ impl Senses {
         self.radar.as_ref().map(|sensor| sensor.topic.as_str())
     }
 
-    /// What the pictures and clouds of some ticks show, by the place of their messages, each of
-    /// which is read, decoded and brought down to what is stored once, in the order of the file.
+    /// Name of the topic of a signal, where frames can have what its messages show, each for itself.
+    pub fn topic(&self, signal: Signal) -> Option<&str> {
+        match signal {
+            Signal::Camera => self.footage.is_none().then_some(self.camera.as_str()),
+            Signal::Lidar => self.lidar(),
+            Signal::Radar => self.radar(),
+        }
+    }
+
+    /// Where the sensor of a signal sits in the optical frame of the camera; `None` for the camera.
     ///
     /// # Errors
     ///
-    /// If the log cannot be read any more.
-    pub fn show(&self, recording: &Recording, ticks: &[Tick]) -> Result<Shown> {
-        let mut wanted = BTreeMap::new();
-        for tick in ticks {
-            if self.footage.is_none() {
-                wanted.insert(tick.image.value, (Signal::Camera, tick.image.stamp_ns));
+    /// A sentence, if nothing tells.
+    pub fn pose(
+        &self,
+        recording: &Recording,
+        signal: Signal,
+        stamp_ns: i64,
+    ) -> Result<Option<Pose>, String> {
+        let sensor = match signal {
+            Signal::Camera => return Ok(None),
+            Signal::Lidar => &self.lidar,
+            Signal::Radar => &self.radar,
+        };
+        let Some(sensor) = sensor else {
+            unreachable!("a tick has a sample of a sensor that is placed")
+        };
+        let frame = &recording.topics[&sensor.topic].frame_id;
+        let camera_frame = &self.camera_topic(recording).frame_id;
+        let pose = recording.transforms.lookup(camera_frame, frame, stamp_ns)?;
+        Ok(Some(sensor.optical_from_camera.then(&pose)))
+    }
+
+    /// What a message shows: a function of its bytes, of the sensors and of [`pose`](Senses::pose)
+    /// alone.
+    pub fn sense(
+        &self,
+        recording: &Recording,
+        signal: Signal,
+        message: &[u8],
+        pose: &Result<Option<Pose>, String>,
+    ) -> Sensed {
+        let project = |sensor: &Option<Sensor>| match (sensor, &self.stored_camera, pose) {
+            (Some(sensor), Some(camera), Ok(Some(pose))) => {
+                Ok((&recording.topics[&sensor.topic], camera, *pose))
             }
-            for (signal, sample) in [(Signal::Lidar, &tick.lidar), (Signal::Radar, &tick.radar)] {
-                wanted.extend(sample.as_ref().map(|s| (s.value, (signal, s.stamp_ns))));
-            }
-        }
-        let mut reader = SegmentReader::new(&recording.log);
-        let mut sensed = BTreeMap::new();
-        for (place, (signal, stamp_ns)) in wanted {
-            let message = reader.message(&place)?;
-            let shown = match signal {
-                Signal::Camera => Sensed::Picture(self.picture(recording, message)),
-                Signal::Lidar => Sensed::Lidar(self.project(
-                    recording,
-                    &self.lidar,
-                    message,
-                    stamp_ns,
-                    |topic, message, pose, camera| {
-                        lidar_pixels(&topic.decode(message)?, pose, camera)
-                    },
-                )),
-                Signal::Radar => Sensed::Radar(self.project(
-                    recording,
-                    &self.radar,
-                    message,
-                    stamp_ns,
-                    |topic, message, pose, camera| {
-                        radar_pixels(
-                            topic.kind,
-                            &topic.decode(message)?,
-                            &self.radar_rule,
-                            pose,
-                            camera,
-                        )
-                    },
-                )),
-            };
-            sensed.insert(place, shown);
-        }
-        if let Some(footage) = &self.footage {
-            let wanted: Vec<Place> = ticks.iter().map(|tick| tick.image.value).collect();
-            let camera = self.camera_topic(recording);
-            footage.decode(&recording.log, camera, &wanted, &mut |place, picture| {
-                let stored = picture.and_then(|rgb| {
-                    let stored = self.store(&Decoded::whole(rgb));
-                    stored.map_err(|why| (Reason::ImageDamaged, why))
+            (_, _, Err(why)) => Err(why.clone()),
+            _ => unreachable!("a sensor is placed where there is a calibrated camera"),
+        };
+        match signal {
+            Signal::Camera => {
+                let camera = self.camera_topic(recording);
+                let message = camera.decode(message).map_err(|error| error.to_string());
+                let stored = message.and_then(|message| {
+                    self.store(&recorded_picture(camera, &message, &self.rule)?)
                 });
-                sensed.insert(place, Sensed::Picture(stored));
-            })?;
+                Sensed::Picture(stored.map_err(|why| (Reason::ImageDamaged, why)))
+            }
+            Signal::Lidar => {
+                Sensed::Lidar(project(&self.lidar).and_then(|(topic, camera, pose)| {
+                    let pixels =
+                        topic.decode(message).and_then(|m| lidar_pixels(&m, &pose, camera));
+                    pixels.map_err(|error| error.to_string())
+                }))
+            }
+            Signal::Radar => {
+                Sensed::Radar(project(&self.radar).and_then(|(topic, camera, pose)| {
+                    let pixels = topic.decode(message).and_then(|message| {
+                        radar_pixels(topic.kind, &message, &self.radar_rule, &pose, camera)
+                    });
+                    pixels.map_err(|error| error.to_string())
+                }))
+            }
         }
-        Ok(Shown(sensed))
     }
 
-    /// The picture of a message as it is stored, or why there is none.
-    fn picture(&self, recording: &Recording, message: &[u8]) -> Result<Vec<u8>, LeftOut> {
-        let camera = self.camera_topic(recording);
-        let message = camera.decode(message).map_err(|error| error.to_string());
-        let stored = message
-            .and_then(|message| self.store(&recorded_picture(camera, &message, &self.rule)?));
-        stored.map_err(|why| (Reason::ImageDamaged, why))
-    }
-
-    fn store(&self, recorded: &Decoded) -> Result<Vec<u8>, String> {
+    /// A picture as it is stored.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: it has not the size of the others, or the rule is wrong.
+    pub fn store(&self, recorded: &Decoded) -> Result<Vec<u8>, String> {
         if (recorded.width, recorded.height) != self.picture_size {
             let (width, height) = self.picture_size;
             return Err(format!(
@@ -263,26 +236,8 @@ impl Senses {
         recorded.stored(&self.rule)
     }
 
-    /// Bring the returns of a sensor's message onto the stored picture.
-    fn project<T>(
-        &self,
-        recording: &Recording,
-        sensor: &Option<Sensor>,
-        message: &[u8],
-        stamp_ns: i64,
-        pixels: impl Fn(&Topic, &[u8], &Pose, &Camera) -> Result<T>,
-    ) -> Result<T, String> {
-        let (Some(sensor), Some(camera)) = (sensor, &self.stored_camera) else {
-            unreachable!("a sensor is placed where there is a calibrated camera")
-        };
-        let topic = &recording.topics[&sensor.topic];
-        let camera_frame = &self.camera_topic(recording).frame_id;
-        let pose = recording.transforms.lookup(camera_frame, &topic.frame_id, stamp_ns)?;
-        let pose = sensor.optical_from_camera.then(&pose);
-        pixels(topic, message, &pose, camera).map_err(|error| error.to_string())
-    }
-
-    fn camera_topic<'r>(&self, recording: &'r Recording) -> &'r Topic {
+    /// The camera's topic.
+    pub fn camera_topic<'r>(&self, recording: &'r Recording) -> &'r Topic {
         &recording.topics[&self.camera]
     }
 }

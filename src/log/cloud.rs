@@ -5,6 +5,8 @@
 //! row, little-endian, placed in their frame by a pose. Nothing is assumed of the order, the
 //! padding or the types.
 
+use glam::DVec3;
+
 use crate::{
     error::{Error, Result},
     log::{
@@ -118,6 +120,19 @@ impl<'a> Cloud<'a> {
         }
     }
 
+    /// Where the points are by fields x, y and z, in the order of the message.
+    pub fn positions(&self, [x, y, z]: [&CloudField; 3]) -> impl Iterator<Item = DVec3> {
+        let is_f32 = |field: &CloudField| field.scalar == Scalar::F32;
+        let is_usual = is_f32(x) && is_f32(y) && is_f32(z) && self.endian == Endian::Little;
+        let offsets = [x, y, z].map(|field| field.offset);
+        let fields = [x, y, z].map(Clone::clone);
+        self.points().map(move |point| match is_usual {
+            // Tens of thousands of times, so without a look at each number's type.
+            true => DVec3::from_array(offsets.map(|offset| point.f32(offset))),
+            false => DVec3::from_array([0, 1, 2].map(|axis: usize| point.get(&fields[axis]))),
+        })
+    }
+
     /// Points in the order of the message.
     pub fn points(&self) -> impl Iterator<Item = CloudPoint<'a>> {
         let (data, endian) = (self.data, self.endian);
@@ -139,6 +154,12 @@ pub struct CloudPoint<'a> {
 }
 
 impl CloudPoint<'_> {
+    #[inline(always)]
+    fn f32(&self, offset: usize) -> f64 {
+        let bytes = self.bytes[offset..].first_chunk().copied().unwrap_or_default();
+        f64::from(f32::from_le_bytes(bytes))
+    }
+
     /// The value of a field of the same cloud.
     pub fn get(&self, field: &CloudField) -> f64 {
         field.scalar.read(&self.bytes[field.offset..], self.endian)

@@ -96,8 +96,31 @@ pub struct Damage {
     pub what: String,
 }
 
+/// Sees a log while it is scanned.
+pub trait Visitor {
+    /// The next message that could be read.
+    fn message(&mut self, message: &Message) -> Result<()>;
+
+    /// All messages of a chunk have been seen: those whose place is in segment `chunk`, and whose
+    /// data lies in `data` as their places say.
+    fn chunk(&mut self, log: &Log, chunk: u32, data: &[u8]) -> Result<()>;
+}
+
+/// Sees messages alone.
+struct Messages<'f>(&'f mut dyn FnMut(&Message) -> Result<()>);
+
+impl Visitor for Messages<'_> {
+    fn message(&mut self, message: &Message) -> Result<()> {
+        (self.0)(message)
+    }
+
+    fn chunk(&mut self, _log: &Log, _chunk: u32, _data: &[u8]) -> Result<()> {
+        Ok(())
+    }
+}
+
 /// A run of messages that is read and decompressed at once.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Segment {
     Chunk { data_offset: u64, stored_bytes: u64, header: ChunkHeader },
     Plain { offset: u64, len: u64 },
@@ -130,7 +153,7 @@ impl Log {
     /// If the file cannot be opened or read, is empty, or does not begin as an MCAP file does;
     /// and whatever `on_message` returns.
     pub fn scan(path: &Path, on_message: &mut dyn FnMut(&Message) -> Result<()>) -> Result<Log> {
-        Log::scan_telling(path, &|_| (), on_message)
+        Log::visit(path, &|_| (), &mut Messages(on_message))
     }
 
     /// The same; `on_bytes` hears how many bytes it has gone through so far.
@@ -138,11 +161,7 @@ impl Log {
     /// # Errors
     ///
     /// As [`Log::scan`].
-    pub fn scan_telling(
-        path: &Path,
-        on_bytes: &dyn Fn(u64),
-        on_message: &mut dyn FnMut(&Message) -> Result<()>,
-    ) -> Result<Log> {
+    pub fn visit(path: &Path, on_bytes: &dyn Fn(u64), visitor: &mut dyn Visitor) -> Result<Log> {
         let file = File::open(path).map_err(Error::io("open", path))?;
         let size_bytes = file.metadata().map_err(Error::io("examine", path))?.len();
         let mut log = Log {
@@ -158,8 +177,27 @@ impl Log {
         };
         log.check_magic()?;
         let chunks = BTreeSet::new();
-        Walk { schemas: BTreeMap::new(), chunks, on_bytes, on_message }.run(&mut log)?;
+        Walk { schemas: BTreeMap::new(), chunks, on_bytes, visitor }.run(&mut log)?;
         Ok(log)
+    }
+
+    /// A log as far as it has been scanned: its messages can be fetched while the scan goes on.
+    ///
+    /// # Errors
+    ///
+    /// If the system has no more handles for files.
+    pub fn so_far(&self) -> Result<Log> {
+        Ok(Log {
+            path: self.path.clone(),
+            size_bytes: self.size_bytes,
+            sha256: String::new(),
+            channels: self.channels.clone(),
+            counts: self.counts.clone(),
+            metadata: self.metadata.clone(),
+            damage: Vec::new(),
+            file: self.file.try_clone().map_err(Error::io("open", &self.path))?,
+            segments: self.segments.clone(),
+        })
     }
 
     /// Messages that could be read.
@@ -243,7 +281,7 @@ struct Walk<'f> {
     /// Where chunks were met, readable or not.
     chunks: BTreeSet<u64>,
     on_bytes: &'f dyn Fn(u64),
-    on_message: &'f mut dyn FnMut(&Message) -> Result<()>,
+    visitor: &'f mut dyn Visitor,
 }
 
 impl Walk<'_> {
@@ -393,7 +431,7 @@ impl Walk<'_> {
         if read != data.len() {
             log.damaged(offset, "chunk whose records do not fill it");
         }
-        Ok(())
+        self.visitor.chunk(log, segment, data)
     }
 
     /// A record that tells something about the log; `place` is (segment, start of the body).
@@ -429,7 +467,7 @@ impl Walk<'_> {
                     start: place.1 + MESSAGE_HEADER_BYTES as u32,
                     len: data.len() as u32,
                 };
-                (self.on_message)(&Message {
+                self.visitor.message(&Message {
                     channel,
                     log_time_ns: instant_ns(header.log_time),
                     publish_time_ns: instant_ns(header.publish_time),

@@ -11,12 +11,16 @@ use crate::{
         clock::{ClockRule, instant_text},
         decoder::Decoder,
         jumps::{self, Beginning},
-        reader::{Channel, Log, Message},
+        reader::{Channel, Log, Message, Visitor},
         recording::{Recording, Topic, TopicMark, Unused},
         signals::{self, Header, Kind},
         transforms::TransformTree,
     },
 };
+
+/// Hears of a chunk when it has been scanned: what is known by then, its number among the segments
+/// of the log, and its data.
+pub type OnChunk<'f> = dyn FnMut(&Scanned, u32, &[u8]) -> Result<()> + 'f;
 
 impl Recording {
     /// Scan a log: one recording, and another one from each place on where its clocks jump back
@@ -26,25 +30,62 @@ impl Recording {
     ///
     /// As [`Log::scan`]. A message that cannot be decoded is counted in its topic, not an error.
     pub fn scan(path: &Path, clock: &ClockRule) -> Result<Vec<Recording>> {
-        Recording::scan_telling(path, clock, &|_| ())
+        Recording::scan_followed(path, clock, &|_| (), &mut |_, _, _| Ok(()))
     }
 
-    /// The same; `on_bytes` hears how many bytes it has gone through so far.
+    /// The same; `on_bytes` hears how many bytes it has gone through so far, and `on_chunk` of every
+    /// chunk.
     ///
     /// # Errors
     ///
-    /// As [`Recording::scan`].
-    pub fn scan_telling(
+    /// As [`Recording::scan`], and what `on_chunk` says.
+    pub fn scan_followed(
         path: &Path,
         clock: &ClockRule,
         on_bytes: &dyn Fn(u64),
+        on_chunk: &mut OnChunk,
     ) -> Result<Vec<Recording>> {
-        let mut builder = Builder::new(clock);
-        let log = Log::scan_telling(path, on_bytes, &mut |message| {
-            builder.add(message);
-            Ok(())
-        })?;
-        Ok(builder.finish(log))
+        let mut following = Following { builder: Builder::new(clock), on_chunk };
+        let log = Log::visit(path, on_bytes, &mut following)?;
+        Ok(following.builder.finish(log))
+    }
+}
+
+/// A log as far as it has been scanned.
+pub struct Scanned<'s> {
+    log: &'s Log,
+    builder: &'s Builder<'s>,
+}
+
+impl Scanned<'_> {
+    /// What is known of a topic: its samples in the order of the file.
+    pub fn topic(&self, name: &str) -> Option<&Topic> {
+        self.builder.topics.get(name)
+    }
+
+    /// What the recording would be that is being scanned, if the log ended here.
+    ///
+    /// # Errors
+    ///
+    /// As [`Log::so_far`].
+    pub fn recording(&self) -> Result<Option<Recording>> {
+        Ok(self.builder.clone().finish(self.log.so_far()?).pop())
+    }
+}
+
+struct Following<'c> {
+    builder: Builder<'c>,
+    on_chunk: &'c mut OnChunk<'c>,
+}
+
+impl Visitor for Following<'_> {
+    fn message(&mut self, message: &Message) -> Result<()> {
+        self.builder.add(message);
+        Ok(())
+    }
+
+    fn chunk(&mut self, log: &Log, chunk: u32, data: &[u8]) -> Result<()> {
+        (self.on_chunk)(&Scanned { log, builder: &self.builder }, chunk, data)
     }
 }
 
@@ -58,7 +99,7 @@ enum Entry {
 }
 
 /// How much there was of everything when a clock stepped back.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Mark {
     topics: BTreeMap<String, TopicMark>,
     links: BTreeMap<String, usize>,
@@ -70,6 +111,7 @@ struct Mark {
 /// messages are sorted, and no jump is looked for.
 const MOST_MARKED: usize = 1 << 20;
 
+#[derive(Clone)]
 struct Builder<'c> {
     clock: &'c ClockRule,
     channels: BTreeMap<u16, Entry>,

@@ -7,7 +7,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use pmp::{dataset::manifest::Manifest, frame::Frame};
+use parquet::{
+    basic::{Compression, Encoding},
+    file::reader::{FileReader, SerializedFileReader},
+};
+use pmp::{
+    atomic::Committed,
+    dataset::{
+        manifest::Manifest,
+        shard::{ROWS_PER_GROUP, ShardReader, ShardRecord, ShardWriter},
+    },
+    frame::{Frame, LidarPixels},
+};
 
 use crate::{
     fixtures::DriveLog,
@@ -83,4 +94,55 @@ fn what_a_kill_leaves_of_the_small_files_goes_with_the_next_run() {
     fs::write(&stale, b"left by another attempt").unwrap();
     assert_eq!(into(&killed, &given).code, 0, "{}", text(&killed));
     same_trees(&whole, &killed);
+}
+
+#[test]
+fn lists_of_half_floats_are_read_back_whatever_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = DriveLog { seconds: 8.0, ..DriveLog::default() }.write(folder.path(), "drive.mcap");
+    let dataset = folder.path().join("data");
+    assert_eq!(into(&dataset, &[&log]).code, 0);
+    let mut written: Vec<Frame> = frames(&dataset).into_iter().map(|(_, frame)| frame).collect();
+    for (at, frame) in written.iter_mut().enumerate() {
+        match at % 5 {
+            0 => frame.lidar = None,
+            1 => frame.lidar = Some(LidarPixels::default()),
+            2 => frame.radar = None,
+            3 => frame.radar.as_mut().unwrap().speed_mps = None,
+            _ => {}
+        }
+    }
+    for first in [0, 1, 4] {
+        let part = &written[first..];
+        let path = format!("frames/split=train/{first}.parquet");
+        let mut shard = ShardWriter::create(&dataset.join(&path)).unwrap();
+        shard.write("ep", part).unwrap();
+        let rows = shard.rows() as u64;
+        let Committed { bytes, sha256 } = shard.finish().unwrap();
+        let record = ShardRecord { path: path.clone(), rows, bytes, sha256, groups: None };
+        let reader = ShardReader::open(&dataset, &record).unwrap();
+        let read: Vec<Frame> = (0..part.len().div_ceil(ROWS_PER_GROUP))
+            .flat_map(|group| reader.frames(group).unwrap())
+            .map(|(_, frame)| frame)
+            .collect();
+        assert!(read == part);
+
+        let file = fs::File::open(dataset.join(&path)).unwrap();
+        let footer = SerializedFileReader::new(file).unwrap();
+        let group = footer.metadata().row_group(0);
+        let of = |name: &str| {
+            let column = group.columns().iter().find(|c| c.column_path().parts()[0] == name);
+            let column = column.unwrap();
+            (column.encodings().collect::<Vec<_>>(), column.compression())
+        };
+        for name in ["lidar_pixel", "radar_pixel"] {
+            assert!(of(name).0.contains(&Encoding::DELTA_BINARY_PACKED), "{:?}", of(name));
+        }
+        // DuckDB reads half floats of no other encoding.
+        for name in ["lidar_x", "radar_speed"] {
+            assert!(of(name).0.contains(&Encoding::PLAIN), "{:?}", of(name));
+            assert!(matches!(of(name).1, Compression::ZSTD(_)), "{:?}", of(name));
+        }
+        assert_eq!(of("image").1, Compression::UNCOMPRESSED);
+    }
 }

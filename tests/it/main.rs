@@ -24,6 +24,7 @@ mod protobuf;
 mod logs;
 mod fuzz_corpus;
 mod alignment;
+mod ahead;
 mod ingest;
 mod collection;
 mod compaction;

@@ -7,7 +7,7 @@ use std::{path::Path, process::Command};
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use pmp::{
     dataset::picture::{
-        self, jpeg,
+        self, Content, Decoded, jpeg,
         rgb::{MAX_PIXELS, Rgb},
         scale::{self, Area},
     },
@@ -60,19 +60,40 @@ fn webp_of(rgb: &Rgb) -> Vec<u8> {
     data
 }
 
+/// 33 x 24 pixels in the lossy form, written by OpenCV at quality 40.
+const LOSSY_WEBP: [&str; 5] = [
+    "52494646ac0000005745425056503820a00000009005009d012a210018003ee160a74da8a623a235",
+    "5bf801101c096a00ac32fb392fc8219540c1461ec32117fa2b8218c64945ed790000fef45140bab4",
+    "1a4f6181923b89735ecbac99ef6d46cf9414c0ef07a3a11ca0d1e164a26cb659069930ccf819be29",
+    "3b3977f2fd5a743ad313f150d0d9b17ea3b8c38fb297db22ac7faced01b5e80f5bce8b2731b58762",
+    "8bed9ad4ffc115be2fe2fdffc115be2d36000000",
+];
+
+fn lossy_webp() -> Vec<u8> {
+    let hex = LOSSY_WEBP.concat();
+    (0..hex.len() / 2).map(|at| u8::from_str_radix(&hex[2 * at..2 * at + 2], 16).unwrap()).collect()
+}
+
 /// A rule that stores pictures as large as they are, so that nothing is shrunk while decoding.
 fn unscaled() -> CameraRule {
     CameraRule { width: 8192, height: 8192, ..CameraRule::default() }
 }
 
 fn decode(data: &[u8]) -> Result<Rgb, String> {
-    picture::decode(&Picture::Compressed { data }, &unscaled()).map(|decoded| decoded.rgb)
+    picture::decode(&Picture::Compressed { data }, &unscaled()).map(rgb_of)
+}
+
+fn rgb_of(decoded: Decoded) -> Rgb {
+    match decoded.content {
+        Content::Rgb(rgb) => rgb,
+        other => panic!("not every pixel was decoded: {other:?}"),
+    }
 }
 
 fn raw(width: usize, height: usize, encoding: &str, row_bytes: usize, data: &[u8]) -> Rgb {
     let encoding = Encoding::of(encoding).unwrap();
     let pixels = Pixels { width, height, encoding, row_bytes, endian: Endian::Little, data };
-    picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap().rgb
+    rgb_of(picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap())
 }
 
 fn psnr_db(a: &[u8], b: &[u8]) -> f64 {
@@ -94,10 +115,12 @@ fn a_picture_that_is_cut_off_is_an_error_or_whole_and_never_half() {
         ("grey JPEG", grey_jpeg),
         ("PNG", png_of(&rgb)),
         ("WebP", webp_of(&rgb)),
+        ("lossy WebP", lossy_webp()),
     ];
     for (name, file) in &files {
         let whole = decode(file).unwrap();
-        assert_eq!((whole.width, whole.height), (49, 37));
+        let size = if *name == "lossy WebP" { (33, 24) } else { (49, 37) };
+        assert_eq!((whole.width, whole.height), size);
         let mut errors = 0;
         for len in (0..file.len()).rev() {
             match decode(&file[..len]) {
@@ -195,7 +218,7 @@ fn samples_of_any_layout_become_red_green_blue() {
     let data = [255, 254, 0, 128];
     let pixels =
         Pixels { width: 2, height: 1, encoding, row_bytes: 4, endian: Endian::Big, data: &data };
-    let rgb = picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap().rgb;
+    let rgb = rgb_of(picture::decode(&Picture::Raw(pixels), &unscaled()).unwrap());
     assert_eq!(rgb.data, [255, 255, 255, 0, 0, 0], "65278 and 128 of 65535");
 }
 
@@ -347,41 +370,86 @@ proptest! {
 fn a_shrunk_decode_is_close_to_the_full_one_and_in_its_place() {
     // Odd sizes: the last column and row of the shrunk picture stand for less than the others.
     let rgb = scene(1281, 723);
-    let file = jpeg_of(&rgb, SamplingFactor::F_2_2, false);
-    let full = jpeg::decode(&file).unwrap();
+    let grey: Vec<u8> = rgb.data.iter().step_by(3).copied().collect();
+    let mut grey_jpeg = Vec::new();
+    Encoder::new(&mut grey_jpeg, 92).encode(&grey, 1281, 723, ColorType::Luma).unwrap();
+    let mut in_runs = Vec::new();
+    let mut encoder = Encoder::new(&mut in_runs, 92);
+    encoder.set_restart_interval(7);
+    encoder.encode(&rgb.data, 1281, 723, ColorType::Rgb).unwrap();
+    let files = [
+        ("4:2:0", jpeg_of(&rgb, SamplingFactor::F_2_2, false)),
+        ("4:2:2", jpeg_of(&rgb, SamplingFactor::F_2_1, false)),
+        ("4:4:0", jpeg_of(&rgb, SamplingFactor::F_1_2, false)),
+        ("4:4:4", jpeg_of(&rgb, SamplingFactor::F_1_1, false)),
+        ("grey", grey_jpeg),
+        ("with restarts", in_runs),
+        ("progressive", jpeg_of(&rgb, SamplingFactor::F_2_2, true)),
+    ];
+    let cropped = |x, y, width, height| CameraRule {
+        crop: Some(Crop { x, y, width, height }),
+        ..CameraRule::default()
+    };
     for (rule, reduction) in [
         (CameraRule::default(), 2),
+        (CameraRule { width: 320, height: 180, ..CameraRule::default() }, 4),
         (CameraRule { width: 160, height: 90, ..CameraRule::default() }, 8),
-        (
-            CameraRule {
-                crop: Some(Crop { x: 101, y: 33, width: 1001, height: 555 }),
-                ..CameraRule::default()
-            },
-            1,
-        ),
-        (
-            CameraRule {
-                crop: Some(Crop { x: 3, y: 1, width: 1277, height: 719 }),
-                ..CameraRule::default()
-            },
-            2,
-        ),
+        (cropped(101, 33, 1001, 555), 1),
+        (cropped(3, 1, 1277, 719), 2),
+        (CameraRule { width: 601, height: 251, ..CameraRule::default() }, 1),
     ] {
-        let decoded = picture::decode(&Picture::Compressed { data: &file }, &rule).unwrap();
-        let shrinks = jpeg::REDUCTIONS.len() > 1;
-        assert_eq!(decoded.reduction, if shrinks { reduction } else { 1 });
-        assert_eq!((decoded.width, decoded.height), (1281, 723));
-        let stored = decode(&decoded.stored(&rule).unwrap()).unwrap();
-        let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width: 1281, height: 723 });
-        let area = Area {
-            x: crop.x as f64,
-            y: crop.y as f64,
-            width: crop.width as f64,
-            height: crop.height as f64,
-        };
-        let expected = scale::resize(&full, area, rule.width, rule.height).unwrap();
-        let close_db = psnr_db(&stored.data, &expected.data);
-        assert!(close_db > 35.0, "{close_db} dB");
+        for (name, file) in &files {
+            let full = jpeg::decode(file).unwrap();
+            let decoded = picture::decode(&Picture::Compressed { data: file }, &rule).unwrap();
+            match &decoded.content {
+                Content::Planes(planes) => assert_eq!(planes.luma.pixels, [reduction; 2], "{name}"),
+                _ => assert!(reduction == 1 || *name == "progressive", "{name}"),
+            }
+            assert_eq!((decoded.width, decoded.height), (1281, 723));
+            let stored = decode(&decoded.stored(&rule).unwrap()).unwrap();
+            let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width: 1281, height: 723 });
+            let area = Area {
+                x: crop.x as f64,
+                y: crop.y as f64,
+                width: crop.width as f64,
+                height: crop.height as f64,
+            };
+            let expected = scale::resize(&full, area, rule.width, rule.height).unwrap();
+            let close_db = psnr_db(&stored.data, &expected.data);
+            // One sample a stored pixel: colours at half of that have little to be averaged from.
+            let least_db = if reduction == 8 { 33.0 } else { 35.0 };
+            assert!(close_db > least_db, "{name} at 1/{reduction}: {close_db} dB");
+        }
+    }
+}
+
+#[test]
+fn a_jpeg_that_lacks_data_inside_is_damaged_although_it_ends_as_it_should() {
+    let rgb = scene(320, 240);
+    let mut in_runs = Vec::new();
+    let mut encoder = Encoder::new(&mut in_runs, 92);
+    encoder.set_restart_interval(5);
+    encoder.encode(&rgb.data, 320, 240, ColorType::Rgb).unwrap();
+    let kept = CameraRule { width: 320, height: 240, ..CameraRule::default() };
+    let shrunk = CameraRule { width: 160, height: 120, ..CameraRule::default() };
+    let restart = |two: &[u8]| matches!(two, [0xff, 0xd0..=0xd7]);
+    let run = in_runs.windows(2).position(restart).unwrap();
+    let next = run + 2 + in_runs[run + 2..].windows(2).position(restart).unwrap();
+    let without_run = [&in_runs[..run], &in_runs[next..]].concat();
+    let mut files = vec![without_run];
+    for file in [jpeg_of(&rgb, SamplingFactor::F_2_2, false), in_runs] {
+        // A byte or two may be missed: codes find each other again.
+        for (cut, at) in [(100, 0.3), (300, 0.9), (1000, 0.4), (3000, 0.7)] {
+            let at = (at * file.len() as f64) as usize;
+            files.push([&file[..at], &file[at + cut..]].concat());
+        }
+        assert!(decode(&file).unwrap().width == 320);
+    }
+    for (number, file) in files.iter().enumerate() {
+        for rule in [&kept, &shrunk, &unscaled()] {
+            let decoded = picture::decode(&Picture::Compressed { data: file }, rule);
+            assert!(decoded.is_err(), "file {number}, stored as {} pixels", rule.width);
+        }
     }
 }
 

@@ -285,3 +285,43 @@ fn deep_and_endless_json_is_refused() {
     // Only the fields that were asked for are looked into.
     assert!(json::decode(&schema, br#"{"a": "?"}"#, Some(&["b"])).unwrap().fields.is_empty());
 }
+
+#[test]
+fn json_that_nests_too_deeply_is_refused_where_it_is_asked_for() {
+    let schema = json::parse("a/All", b"").unwrap();
+    let nested = |levels: usize, open: &str, close: &str| {
+        format!("{{\"data\": {}0{}}}", open.repeat(levels), close.repeat(levels)).into_bytes()
+    };
+    for (open, close) in [("[", "]"), ("{\"a\":", "}")] {
+        assert!(json::decode(&schema, &nested(100, open, close), None).is_ok());
+        for levels in [128, 100_000] {
+            let text = nested(levels, open, close);
+            let why = json::decode(&schema, &text, None).unwrap_err().to_string();
+            assert!(why.contains("recursion limit"), "{why}");
+            // What nobody asks for is passed over, however deep it is.
+            assert!(json::decode(&schema, &text, Some(&["header"])).unwrap().fields.is_empty());
+        }
+    }
+    let schema = format!("{}{{}}{}", "{\"items\":".repeat(100_000), "}".repeat(100_000));
+    let why = json::parse("a/All", schema.as_bytes()).unwrap_err();
+    assert!(why.contains("recursion limit"), "{why}");
+}
+
+#[test]
+fn bytes_in_json_may_be_base64_or_numbers() {
+    let schema = json::parse("sensor_msgs/CompressedImage", b"").unwrap();
+    let bytes: Vec<u8> = (0..=255).chain([0, 7, 255]).collect();
+    let spaced = format!("{bytes:?}").replace(", ", " ,\n ");
+    let pointed = format!("{bytes:?}").replace(',', ".0,").replace(']', ".0]");
+    for list in [format!("{bytes:?}"), spaced, pointed] {
+        let text = format!("{{\"format\": \"jpeg\", \"data\": {list}}}");
+        let message = json::decode(&schema, text.as_bytes(), None).unwrap();
+        assert_eq!(message.bytes("data").unwrap(), bytes, "{text}");
+    }
+    // None of these is a list of bytes.
+    for list in ["[255, 256]", "[-1, 2]", "[1, 0.5]", "[1, null]", "[1, [2]]", "[\"/9j/\"]", "7"] {
+        let text = format!("{{\"format\": \"jpeg\", \"data\": {list}}}");
+        let message = json::decode(&schema, text.as_bytes(), None).unwrap();
+        assert!(message.bytes("data").is_err(), "{list}");
+    }
+}

@@ -1,5 +1,7 @@
 //! What the header of a JPEG says of its picture (ITU-T T.81, annex B).
 
+use crate::dataset::picture::jpeg_segments::{START_OF_SCAN, segments};
+
 /// As far as reading and keeping it needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
@@ -7,6 +9,8 @@ pub struct Header {
     pub height: usize,
     /// Colour as the stored pictures have it: baseline, Y Cb Cr, colour of 2 x 2 pixels shared.
     pub is_baseline_420: bool,
+    /// Whether the samples are red, green and blue instead of luma and colour differences.
+    pub is_rgb: bool,
 }
 
 impl Header {
@@ -16,32 +20,16 @@ impl Header {
     ///
     /// A sentence, if there is none.
     pub fn read(jpeg: &[u8]) -> Result<Header, String> {
-        let mut at = 2;
         let mut is_rgb = false;
         let mut frame: Option<Header> = None;
-        loop {
-            let marker = match jpeg.get(at..at + 2) {
-                // Any number of fill bytes may stand before a marker.
-                Some([0xff, 0xff]) => {
-                    at += 1;
-                    continue;
-                }
-                Some([0xff, marker]) => *marker,
-                _ => return Err("a JPEG whose header is cut off or damaged".to_string()),
-            };
-            let len = match jpeg.get(at + 2..at + 4) {
-                Some(&[high, low]) => usize::from(u16::from_be_bytes([high, low])),
-                _ => 0,
-            };
-            let Some(body) = jpeg.get(at + 4..at + 2 + len) else {
-                return Err("a JPEG whose header is cut off or damaged".to_string());
-            };
-            match (marker, body) {
+        for segment in segments(jpeg) {
+            let segment = segment?;
+            match (segment.marker, segment.body) {
                 // Adobe's segment says 0 where the samples are no luma and colour differences.
                 (0xee, [b'A', b'd', b'o', b'b', b'e', .., transform]) => is_rgb = *transform == 0,
                 // All frame headers: C4, C8 and CC among them are something else.
                 (0xc0..=0xcf, [_, h1, h0, w1, w0, _, components @ ..])
-                    if ![0xc4, 0xc8, 0xcc].contains(&marker) =>
+                    if ![0xc4, 0xc8, 0xcc].contains(&segment.marker) =>
                 {
                     let components = components.chunks_exact(3);
                     is_rgb |= components.clone().map(|component| component[0]).eq(*b"RGB");
@@ -49,20 +37,19 @@ impl Header {
                     let header = Header {
                         width: usize::from(u16::from_be_bytes([*w1, *w0])),
                         height: usize::from(u16::from_be_bytes([*h1, *h0])),
-                        is_baseline_420: marker == 0xc0 && shares.eq([0x22, 0x11, 0x11]),
+                        is_baseline_420: segment.marker == 0xc0 && shares.eq([0x22, 0x11, 0x11]),
+                        is_rgb: false,
                     };
                     frame = Some(header);
                 }
-                (0xda, _) => {
+                (START_OF_SCAN, _) => {
                     let header = frame.ok_or("a JPEG without a frame header")?;
-                    return Ok(Header {
-                        is_baseline_420: header.is_baseline_420 && !is_rgb,
-                        ..header
-                    });
+                    let is_baseline_420 = header.is_baseline_420 && !is_rgb;
+                    return Ok(Header { is_baseline_420, is_rgb, ..header });
                 }
                 _ => {}
             }
-            at += 2 + len;
         }
+        Err("a JPEG without picture data".to_string())
     }
 }

@@ -1,23 +1,18 @@
-//! JPEG by libjpeg-turbo, which can shrink a picture while it decodes it.
+//! JPEG by libjpeg-turbo.
 
-use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, ScalingFactor, Subsamp};
+use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, Subsamp, YuvImage};
 
-use crate::dataset::picture::{jpeg_header::Header, rgb::Rgb};
+use crate::dataset::picture::{jpeg_header::Header, planes::Stored, rgb::Rgb};
 
-/// By how much pictures can be shrunk while they are decoded, most first. A picture of 8n + k
-/// pixels keeps a column for the k: the last one stands for less of the picture than the others.
-pub const REDUCTIONS: [usize; 4] = [8, 4, 2, 1];
-
-/// Decode at 1 / `reduction` of the size, rounded up.
+/// Decode.
 ///
 /// # Errors
 ///
 /// A sentence: what is wrong with the picture; also where libjpeg-turbo would only warn.
-pub fn decode(jpeg: &[u8], header: Header, reduction: usize) -> Result<Rgb, String> {
+pub fn decode(jpeg: &[u8], header: Header) -> Result<Rgb, String> {
     let said = |error: turbojpeg::Error| error.to_string();
     let mut decoder = Decompressor::new().map_err(said)?;
-    decoder.set_scaling_factor(ScalingFactor::new(1, reduction)).map_err(said)?;
-    let (width, height) = (header.width.div_ceil(reduction), header.height.div_ceil(reduction));
+    let Header { width, height, .. } = header;
     let mut data = vec![0; 3 * width * height];
     let pixels = &mut data[..];
     let rgb = Image { pixels, width, pitch: 3 * width, height, format: PixelFormat::RGB };
@@ -32,11 +27,29 @@ pub fn decode(jpeg: &[u8], header: Header, reduction: usize) -> Result<Rgb, Stri
 /// A sentence, if the picture is too large for the format.
 pub fn encode(picture: &Rgb, quality: u8) -> Result<Vec<u8>, String> {
     let said = |error: turbojpeg::Error| error.to_string();
-    let mut encoder = Compressor::new().map_err(said)?;
-    encoder.set_quality(i32::from(quality)).map_err(said)?;
+    let mut encoder = encoder(quality).map_err(said)?;
     encoder.set_subsamp(Subsamp::Sub2x2).map_err(said)?;
     let Rgb { width, height, ref data } = *picture;
     let rgb =
         Image { pixels: &data[..], width, pitch: 3 * width, height, format: PixelFormat::RGB };
     encoder.compress_to_vec(rgb).map_err(said)
+}
+
+/// Encode luma and colour differences as they are.
+///
+/// # Errors
+///
+/// A sentence, if the picture is too large for the format.
+pub fn encode_planes(picture: &Stored, quality: u8) -> Result<Vec<u8>, String> {
+    let said = |error: turbojpeg::Error| error.to_string();
+    let mut encoder = encoder(quality).map_err(said)?;
+    let Stored { width, height, ref data } = *picture;
+    let planes = YuvImage { pixels: &data[..], width, align: 1, height, subsamp: Subsamp::Sub2x2 };
+    encoder.compress_yuv_to_vec(planes).map_err(said)
+}
+
+fn encoder(quality: u8) -> Result<Compressor, turbojpeg::Error> {
+    let mut encoder = Compressor::new()?;
+    encoder.set_quality(i32::from(quality))?;
+    Ok(encoder)
 }

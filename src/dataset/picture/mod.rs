@@ -7,16 +7,22 @@
 //! so for y ([`Camera::cropped_and_scaled`](crate::projection::Camera::cropped_and_scaled)), which
 //! holds because (0, 0) is the outer corner of the first pixel on both sides. Lens distortion
 //! stays in the picture and in the model. The result is a JPEG 4:2:0 of the profile's quality;
-//! a recorded JPEG that has the stored size and kind already is decoded, to know that it is whole,
-//! and kept byte for byte.
+//! a recorded JPEG that has the stored size and kind already is read through, to know that it is
+//! whole, and kept byte for byte.
 //!
 //! ```text
-//! message -> jpeg, png, webp, raw (bayer, yuv), h264 -> RGB -> scale -> jpeg
+//! message -> png, webp, raw (bayer, yuv), h264, jpeg of other kinds -> RGB -> scale -> jpeg
+//!         -> jpeg_baseline (jpeg_segments, jpeg_header, jpeg_codes) -> jpeg_shrink -> planes -> jpeg
 //! ```
 
 pub mod rgb;
 pub mod scale;
+pub mod planes;
+pub mod jpeg_segments;
 pub mod jpeg_header;
+pub mod jpeg_codes;
+pub mod jpeg_baseline;
+pub mod jpeg_shrink;
 #[cfg(not(feature = "turbojpeg"))]
 pub mod jpeg_rust;
 #[cfg(feature = "turbojpeg")]
@@ -32,8 +38,10 @@ pub mod h264;
 #[cfg(not(feature = "h264"))]
 pub mod h264_absent;
 
+use jpeg_baseline::Baseline;
 use jpeg_header::Header;
-use rgb::Rgb;
+use planes::Planes;
+use rgb::{Rgb, check_size};
 use scale::Area;
 
 use crate::{
@@ -47,12 +55,18 @@ pub struct Decoded<'a> {
     /// Size as recorded, pixels.
     pub width: usize,
     pub height: usize,
-    /// The picture, each of whose pixels stands for `reduction` x `reduction` recorded ones; those
-    /// at the right and lower border for what is left.
-    pub rgb: Rgb,
-    pub reduction: usize,
-    /// The recorded file, if it is of the stored kind.
-    original: Option<&'a [u8]>,
+    pub content: Content<'a>,
+}
+
+/// What was made of a recorded picture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content<'a> {
+    /// Every pixel.
+    Rgb(Rgb),
+    /// As finely as the rule needs it.
+    Planes(Planes),
+    /// Nothing, since it is of the stored kind and size and whole: the recorded file.
+    Kept(&'a [u8]),
 }
 
 /// Decode a picture of a log, as finely as the rule needs it.
@@ -78,21 +92,37 @@ pub fn decode<'a>(picture: &Picture<'a>, rule: &CameraRule) -> Result<Decoded<'a
 
 fn decode_jpeg<'a>(data: &'a [u8], rule: &CameraRule) -> Result<Decoded<'a>, String> {
     let header = Header::read(data)?;
-    let Header { width, height, is_baseline_420 } = header;
-    let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width, height });
+    let Header { width, height, is_baseline_420, .. } = header;
+    check_size(width, height)?;
+    let whole = jpeg::up_to_end(data)?;
+    let all = Crop { x: 0, y: 0, width, height };
+    let crop = rule.crop.unwrap_or(all);
+    let has_stored_size = crop == all && (width, height) == (rule.width, rule.height);
+    let has_pairs = rule.width.is_multiple_of(2) && rule.height.is_multiple_of(2);
     let is_fine = |reduction: &&usize| {
         crop.width >= rule.width * *reduction && crop.height >= rule.height * *reduction
     };
-    let reduction = jpeg::REDUCTIONS.iter().find(is_fine).copied().unwrap_or(1);
-    let rgb = jpeg::decode_reduced(data, header, reduction)?;
-    let original = Some(data).filter(|_| is_baseline_420);
-    Ok(Decoded { width, height, rgb, reduction, original })
+    let reduction = jpeg_shrink::REDUCTIONS.iter().find(is_fine).filter(|_| has_pairs);
+    let content = match (Baseline::read(whole, &header), reduction) {
+        (Some(baseline), _) if has_stored_size && is_baseline_420 => {
+            baseline.check()?;
+            Content::Kept(data)
+        }
+        (Some(baseline), Some(reduction)) => {
+            Content::Planes(jpeg_shrink::decode(&baseline, *reduction)?)
+        }
+        (baseline, _) => {
+            baseline.map_or(Ok(()), |baseline| baseline.check())?;
+            Content::Rgb(jpeg::decode(data)?)
+        }
+    };
+    Ok(Decoded { width, height, content })
 }
 
 impl Decoded<'_> {
     /// A picture that was decoded whole.
     pub fn whole(rgb: Rgb) -> Decoded<'static> {
-        Decoded { width: rgb.width, height: rgb.height, rgb, reduction: 1, original: None }
+        Decoded { width: rgb.width, height: rgb.height, content: Content::Rgb(rgb) }
     }
 
     /// The picture as it is stored: a JPEG, by the rule above.
@@ -102,23 +132,26 @@ impl Decoded<'_> {
     /// A sentence: what is wrong with the rule.
     pub fn stored(&self, rule: &CameraRule) -> Result<Vec<u8>, String> {
         let Decoded { width, height, .. } = *self;
-        let all = Crop { x: 0, y: 0, width, height };
-        let crop = rule.crop.unwrap_or(all);
+        let crop = rule.crop.unwrap_or(Crop { x: 0, y: 0, width, height });
         if !crop.lies_inside(width, height) {
             return Err(format!("the crop does not lie inside the {width} x {height} pixels"));
         }
-        let has_stored_size = crop == all && (width, height) == (rule.width, rule.height);
-        if let Some(original) = self.original.filter(|_| has_stored_size) {
-            return Ok(original.to_vec());
-        }
-        let reduced = |pixels: usize| pixels as f64 / self.reduction as f64;
         let area = Area {
-            x: reduced(crop.x),
-            y: reduced(crop.y),
-            width: reduced(crop.width),
-            height: reduced(crop.height),
+            x: crop.x as f64,
+            y: crop.y as f64,
+            width: crop.width as f64,
+            height: crop.height as f64,
         };
-        let scaled = scale::resize(&self.rgb, area, rule.width, rule.height)?;
-        jpeg::encode(&scaled, rule.quality)
+        match &self.content {
+            Content::Rgb(rgb) => {
+                let scaled = scale::resize(rgb, area, rule.width, rule.height)?;
+                jpeg::encode(&scaled, rule.quality)
+            }
+            Content::Planes(planes) => {
+                let scaled = planes.resize(area, rule.width, rule.height)?;
+                jpeg::encode_planes(&scaled, rule.quality)
+            }
+            Content::Kept(file) => Ok(file.to_vec()),
+        }
     }
 }

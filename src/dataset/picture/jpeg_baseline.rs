@@ -1,0 +1,362 @@
+//! Baseline JPEG, the kind that cameras write, decoded down to its coefficients (ITU-T T.81).
+//!
+//! Everything that is stored of a block is read, and each run of blocks has to end where its bits
+//! end. So data that lacks within is noticed although the file ends as it should, which libraries
+//! that fill up what is missing do not tell.
+
+use crate::dataset::picture::{
+    jpeg_codes::{Bits, Codes, END, Look, PADDING},
+    jpeg_header::Header,
+    jpeg_segments::{START_OF_SCAN, segments},
+};
+
+/// Coefficients of a block.
+pub const COEFFICIENTS: usize = 64;
+
+/// Where the coefficients of a block lie, in the order in which they are stored: 8 x the
+/// vertical frequency + the horizontal one (T.81, figure A.6).
+pub const ZIGZAG: [u8; COEFFICIENTS] = zigzag();
+
+const fn zigzag() -> [u8; COEFFICIENTS] {
+    let mut order = [0; COEFFICIENTS];
+    let (mut row, mut column, mut at) = (0, 0, 0);
+    while at < COEFFICIENTS {
+        order[at] = 8 * row + column;
+        // Up to the right on even diagonals, down to the left on odd ones, along the border between.
+        if (row + column) % 2 == 0 {
+            match (row, column) {
+                (_, 7) => row += 1,
+                (0, _) => column += 1,
+                _ => (row, column) = (row - 1, column + 1),
+            }
+        } else {
+            match (row, column) {
+                (7, _) => column += 1,
+                (_, 0) => row += 1,
+                _ => (row, column) = (row + 1, column - 1),
+            }
+        }
+        at += 1;
+    }
+    order
+}
+
+/// Luma, or a colour difference.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// Blocks beside and above each other in each unit of the scan: 1 or 2.
+    pub across: usize,
+    pub down: usize,
+    /// What the coefficients are to be multiplied by, in the order in which they are stored.
+    pub quantiser: [u16; COEFFICIENTS],
+    dc: Codes,
+    ac: Codes,
+}
+
+/// A file of one scan, ready to be decoded.
+#[derive(Clone, Debug)]
+pub struct Baseline<'a> {
+    pub width: usize,
+    pub height: usize,
+    /// Luma alone, or luma, Cb, Cr; only luma has more than one block a unit.
+    pub components: Vec<Component>,
+    /// Units of the scan between two restarts.
+    restart_interval: Option<usize>,
+    /// Data of the scan, and what comes after it.
+    data: &'a [u8],
+}
+
+/// Takes the coefficients of one block.
+pub trait Block {
+    /// Coefficient `at` in the order in which they are stored, less than [`COEFFICIENTS`].
+    fn set(&mut self, at: usize, value: i32);
+}
+
+/// For who only wants to know whether a picture is whole.
+struct Unseen;
+
+impl Block for Unseen {
+    #[inline(always)]
+    fn set(&mut self, _at: usize, _value: i32) {}
+}
+
+impl<'a> Baseline<'a> {
+    /// Read the tables; `None` for other kinds of JPEG, and where the tables are not usable.
+    pub fn read(jpeg: &'a [u8], header: &Header) -> Option<Baseline<'a>> {
+        let mut quantisers: [Option<[u16; COEFFICIENTS]>; 4] = [None; 4];
+        let mut codes: [[Option<Codes>; 4]; 2] = Default::default();
+        let mut restart_interval = None;
+        let mut frame = None;
+        for segment in segments(jpeg) {
+            let segment = segment.ok()?;
+            match segment.marker {
+                0xdb => read_quantisers(segment.body, &mut quantisers)?,
+                0xc4 => read_codes(segment.body, &mut codes)?,
+                0xdd => {
+                    let units = u16::from_be_bytes(*segment.body.first_chunk()?);
+                    restart_interval = Some(usize::from(units)).filter(|units| *units > 0);
+                }
+                0xc0 if frame.is_none() => frame = Some(segment.body),
+                START_OF_SCAN => {
+                    let components = components(frame?, segment.body, &quantisers, &codes)?;
+                    let is_colour = components.len() == 3;
+                    return (!is_colour || !header.is_rgb).then_some(Baseline {
+                        width: header.width,
+                        height: header.height,
+                        components,
+                        restart_interval,
+                        data: &jpeg[segment.end..],
+                    });
+                }
+                // Frames of other kinds, arithmetic coding, a height that comes later.
+                0xc1..=0xcf | 0xdc => return None,
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Whether the picture is whole.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: what is wrong with it.
+    pub fn check(&self) -> Result<(), String> {
+        self.decode([Unseen, Unseen, Unseen], |_, _, _, _| ())
+    }
+
+    /// Units of the scan in a row, and rows of them.
+    pub fn units(&self) -> (usize, usize) {
+        let luma = &self.components[0];
+        (self.width.div_ceil(8 * luma.across), self.height.div_ceil(8 * luma.down))
+    }
+
+    /// Decode block by block, each of a component into the same of `blocks`; `done` hears of each,
+    /// with the number of its component and its column and row among the blocks of that.
+    ///
+    /// # Errors
+    ///
+    /// A sentence: what is wrong with the picture.
+    pub fn decode<B: Block>(
+        &self,
+        mut blocks: [B; 3],
+        mut done: impl FnMut(&mut B, usize, usize, usize),
+    ) -> Result<(), String> {
+        let (units_across, units_down) = self.units();
+        let all = units_across * units_down;
+        let mut runs = Runs { data: self.data, at: 0, bytes: Vec::new() };
+        let mut unit = 0;
+        for run in 0.. {
+            let end = self.restart_interval.map_or(all, |units| all.min(unit + units));
+            let mut bits = Bits::new(runs.next(run)?);
+            let mut previous = [0; 3];
+            while unit < end {
+                let (column, row) = (unit % units_across, unit / units_across);
+                for (index, component) in self.components.iter().enumerate() {
+                    let block = &mut blocks[index];
+                    for y in 0..component.down {
+                        for x in 0..component.across {
+                            let dc = &mut previous[index];
+                            read_block(&mut bits, component, dc, block)
+                                .ok_or("damaged data of a JPEG")?;
+                            let at = (column * component.across + x, row * component.down + y);
+                            done(block, index, at.0, at.1);
+                        }
+                    }
+                }
+                if bits.left() < 0 {
+                    return Err("a JPEG that lacks some of its data".to_string());
+                }
+                unit += 1;
+            }
+            if bits.left() >= 8 {
+                return Err("a JPEG with data beyond its picture".to_string());
+            }
+            if unit == all {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Read one block; `None` if a code is none, or there are more coefficients than a block has.
+#[inline(always)]
+fn read_block(
+    bits: &mut Bits,
+    component: &Component,
+    previous: &mut i32,
+    block: &mut impl Block,
+) -> Option<()> {
+    bits.fill();
+    let size = bits.symbol(&component.dc, bits.look(&component.dc))?;
+    if size > 11 {
+        return None;
+    }
+    // A hostile file may sum up to anything.
+    *previous = previous.wrapping_add(bits.number(u32::from(size)));
+    block.set(0, *previous);
+    let mut at = 1;
+    while at < COEFFICIENTS {
+        // Enough for two looks, each of 26 bits at most.
+        bits.fill();
+        for _ in 0..2 {
+            let look = bits.look(&component.ac);
+            if look.first == 0 {
+                at += rare(bits, component, look, at, block)?;
+            } else {
+                let [first, second] = bits.numbers(look);
+                at += usize::from(look.first);
+                block.set((at - 1) % COEFFICIENTS, first);
+                if at >= COEFFICIENTS {
+                    // What is seen behind it is of the next block.
+                    bits.skip_first(look);
+                    break;
+                }
+                at += usize::from(look.second);
+                block.set((at - 1) % COEFFICIENTS, second);
+                bits.skip_both(look);
+            }
+            if at >= COEFFICIENTS {
+                break;
+            }
+        }
+    }
+    let is_whole = at == COEFFICIENTS || (END..END + COEFFICIENTS).contains(&at);
+    is_whole.then_some(())
+}
+
+/// Codes that are long, or tell of 16 zeros: how far they lead; `None` for what is no code.
+// Within its caller, whose bits would otherwise lie in memory all the time.
+#[inline(always)]
+fn rare(
+    bits: &mut Bits,
+    component: &Component,
+    look: Look,
+    at: usize,
+    block: &mut impl Block,
+) -> Option<usize> {
+    let symbol = bits.symbol(&component.ac, look)?;
+    match (usize::from(symbol >> 4), symbol & 15) {
+        (0, 0) => Some(END),
+        (15, 0) => Some(16),
+        (_, 0 | 11..) => None,
+        (zeros, size) => {
+            block.set((at + zeros) % COEFFICIENTS, bits.number(u32::from(size)));
+            Some(zeros + 1)
+        }
+    }
+}
+
+/// The runs of a scan's data between its restarts.
+struct Runs<'a> {
+    data: &'a [u8],
+    at: usize,
+    bytes: Vec<u8>,
+}
+
+impl Runs<'_> {
+    /// The bytes of the next run, number `run` from 0, as they were before bytes of 0xff got a
+    /// zero behind them; with padding.
+    fn next(&mut self, run: usize) -> Result<&[u8], String> {
+        let cut = || "a JPEG that is cut off: it has no end".to_string();
+        if run > 0 {
+            let restart = 0xd0 + ((run - 1) % 8) as u8;
+            if self.data.get(self.at..self.at + 2) != Some(&[0xff, restart]) {
+                return Err("a JPEG that lacks some of its data".to_string());
+            }
+            self.at += 2;
+        }
+        self.bytes.clear();
+        loop {
+            let rest = self.data.get(self.at..).ok_or_else(cut)?;
+            let plain = until_ff(rest).ok_or_else(cut)?;
+            self.bytes.extend_from_slice(&rest[..plain]);
+            self.at += plain;
+            match rest.get(plain + 1).ok_or_else(cut)? {
+                0 => {
+                    self.bytes.push(0xff);
+                    self.at += 2;
+                }
+                // Fill bytes before a marker.
+                0xff => self.at += 1,
+                _ => break,
+            }
+        }
+        self.bytes.extend_from_slice(&[0; PADDING]);
+        Ok(&self.bytes)
+    }
+}
+
+/// Where the first byte of 0xff is.
+fn until_ff(bytes: &[u8]) -> Option<usize> {
+    // Many at once, where there is none.
+    let has_ff = |some: &[u8; 32]| some.iter().fold(false, |found, byte| found | (*byte == 0xff));
+    let (pieces, _) = bytes.as_chunks();
+    let from = 32 * pieces.iter().take_while(|piece| !has_ff(piece)).count();
+    Some(from + bytes[from..].iter().position(|byte| *byte == 0xff)?)
+}
+
+fn read_quantisers(mut body: &[u8], into: &mut [Option<[u16; COEFFICIENTS]>; 4]) -> Option<()> {
+    while let [about, rest @ ..] = body {
+        let (wide, slot) = (usize::from(about >> 4), usize::from(about & 15));
+        let len = COEFFICIENTS * (1 + wide);
+        let table = rest.get(..len).filter(|_| wide <= 1)?;
+        let entry = |at: usize| match wide {
+            0 => u16::from(table[at]),
+            _ => u16::from_be_bytes([table[2 * at], table[2 * at + 1]]),
+        };
+        *into.get_mut(slot)? = Some(std::array::from_fn(entry));
+        body = &rest[len..];
+    }
+    Some(())
+}
+
+fn read_codes(mut body: &[u8], into: &mut [[Option<Codes>; 4]; 2]) -> Option<()> {
+    while let [about, rest @ ..] = body {
+        let (class, slot) = (usize::from(about >> 4), usize::from(about & 15));
+        let (counts, rest) = rest.split_first_chunk()?;
+        let len = counts.iter().map(|count| usize::from(*count)).sum();
+        let codes = Codes::new(counts, rest.get(..len)?, class == 1)?;
+        *into.get_mut(class)?.get_mut(slot)? = Some(codes);
+        body = &rest[len..];
+    }
+    Some(())
+}
+
+/// The components of a frame in the order of the scan, which has to be the same.
+fn components(
+    frame: &[u8],
+    scan: &[u8],
+    quantisers: &[Option<[u16; COEFFICIENTS]>; 4],
+    codes: &[[Option<Codes>; 4]; 2],
+) -> Option<Vec<Component>> {
+    let [8, _, _, _, _, count, in_frame @ ..] = frame else { return None };
+    let [in_scan_count, in_scan @ ..] = scan else { return None };
+    let count = usize::from(*count);
+    if ![1, 3].contains(&count)
+        || usize::from(*in_scan_count) != count
+        || in_frame.len() != 3 * count
+        || in_scan.len() != 2 * count + 3
+    {
+        return None;
+    }
+    let pairs = in_frame.chunks_exact(3).zip(in_scan.chunks_exact(2));
+    let component = |(index, (frame, scan)): (usize, (&[u8], &[u8]))| {
+        let (across, down) = (usize::from(frame[1] >> 4), usize::from(frame[1] & 15));
+        let table = |class: usize, slot: u8| codes[class].get(usize::from(slot))?.clone();
+        let most = if index == 0 { 2 } else { 1 };
+        if frame[0] != scan[0] || !(1..=most).contains(&across) || !(1..=most).contains(&down) {
+            return None;
+        }
+        Some(Component {
+            // One component alone has one block a unit, whatever it says (T.81, A.2.2).
+            across: if count == 1 { 1 } else { across },
+            down: if count == 1 { 1 } else { down },
+            quantiser: (*quantisers.get(usize::from(frame[2]))?)?,
+            dc: table(0, scan[1] >> 4)?,
+            ac: table(1, scan[1] & 15)?,
+        })
+    };
+    pairs.enumerate().map(component).collect()
+}
