@@ -167,11 +167,12 @@ pub fn forward(
     let layers = network.layers();
     assert_eq!(layers.len(), weights.len(), "weights of each layer");
     let of_batch = matches!(mode, Mode::Train(_));
+    let buffer = if keep { Buffer::passing } else { Buffer::any };
     let mut at = 0;
     let mut normed = |input: Input, [height, width]: [usize; 2]| {
         let (layer, weights) = (&layers[at], &weights[at]);
         let shape = layer.shape([batch, height, width]);
-        let mut out = Buffer::any(shape.output_len());
+        let mut out = buffer(shape.output_len());
         conv::forward(&shape, input, weights.conv, None, &mut out);
         let moments = match &mut mode {
             Mode::Eval(kept) => kept[at].clone(),
@@ -198,7 +199,7 @@ pub fn forward(
         stride: [2, 2],
         padding: [1, 1],
     };
-    let mut out = Buffer::any(pool.output_len());
+    let mut out = buffer(pool.output_len());
     let mut which = vec![0; out.len()];
     pooling::max(&pool, stem.input(), &mut out, &mut which);
     let mut size = pool.out_size().expect("it was pooled");
@@ -217,7 +218,7 @@ pub fn forward(
             Some(own) => Residual { x: &own.x, affine: Some(own.map.as_affine()) },
             None => Residual { x, affine: None },
         };
-        let mut out = Buffer::any(two.x.len());
+        let mut out = buffer(two.x.len());
         norm::apply(&two.x, two.map.as_affine(), Some(residual), true, &mut out);
         size = side(&two);
         if keep {
