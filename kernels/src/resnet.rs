@@ -158,6 +158,18 @@ impl Network {
 /// If lengths disagree.
 pub fn forward(
     network: &Network,
+    size: [usize; 3],
+    x: &[f32],
+    weights: &[Weights],
+    mode: Mode,
+    keep: bool,
+) -> (Vec<f32>, Option<Tape>) {
+    // On a thread of the pool, or each operation would wake one and wait for it.
+    rayon::scope(|_| forward_here(network, size, x, weights, mode, keep))
+}
+
+fn forward_here(
+    network: &Network,
     [batch, height, width]: [usize; 3],
     x: &[f32],
     weights: &[Weights],
@@ -242,6 +254,17 @@ pub fn forward(
 ///
 /// If lengths disagree.
 pub fn backward(
+    network: &Network,
+    tape: Tape,
+    x: &[f32],
+    weights: &[Weights],
+    grad_features: &[f32],
+    of_x: bool,
+) -> (Vec<Gradients>, Option<Vec<f32>>) {
+    rayon::scope(|_| backward_here(network, tape, x, weights, grad_features, of_x))
+}
+
+fn backward_here(
     network: &Network,
     tape: Tape,
     x: &[f32],
