@@ -16,7 +16,7 @@ if ! cmp --silent $wanted "$peers/installed.txt"; then
 fi
 export PMP_PYTHON=${PMP_PYTHON:-$peers/bin/python}
 
-cargo fmt --check
-cargo clippy --locked --all-targets -- -D warnings
-RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
-cargo test --locked
+cargo fmt --all --check
+cargo clippy --locked --workspace --all-targets -- -D warnings
+RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+cargo test --locked --workspace

@@ -192,7 +192,7 @@ impl Batch {
     /// # Errors
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if the velocities are no `[B, 2]`.
-    pub fn len(&self) -> Result<usize> {
+    pub fn size(&self) -> Result<usize> {
         Ok(self.inputs.velocity.dim(0)?)
     }
 
@@ -203,7 +203,7 @@ impl Batch {
     /// [`Error::Tensor`](crate::error::Error::Tensor) if the tensors do not have the same first
     /// dimension.
     pub fn split(&self, parts: usize) -> Result<Vec<Batch>> {
-        let frames = self.len()?;
+        let frames = self.size()?;
         let size = frames.div_ceil(parts).max(1);
         let cut = |start: usize| {
             let count = size.min(frames - start);

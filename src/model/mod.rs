@@ -1,23 +1,25 @@
 //! Batches in, a policy out.
 //!
 //! ```text
-//! TOML -> config --+
-//!                  +-> init -> pmp -> loss -> adam --+-> train -> run directory -> learned (a policy)
-//! batches ---------+                    ^            |
-//!                                       +------------+
+//! TOML -> net_config, config --+
+//!                              +-> init -> network (pmp, cil, int) -> loss -> gradient -> adam --+-> train -> run directory -> learned (a policy)
+//! batches ---------------------+             ^                                                  |      metrics, curves, events
+//!                                            +---------------------- average -------------------+
 //! ```
 //!
-//! Everything is a function of (configuration, data, step): a training that was stopped at any
-//! moment and resumed ends with the weights, the moments and the curves of one that was not.
+//! Networks are made of `encoder` (strided convolutions, CIL's, `resnet`), `dense` and `mixture`, on
+//! the operations of `ops`. Everything is a function of (configuration, data, step): a training that
+//! was stopped at any moment and resumed ends with the weights, the moments and the curves of one
+//! that was not.
 
 pub mod net_config;
 pub mod config;
 pub mod init;
 pub mod pass;
+pub mod describe;
 pub mod ops;
 pub mod batch_norm;
 pub mod resnet;
-pub mod describe;
 pub mod dense;
 pub mod encoder;
 pub mod mixture;

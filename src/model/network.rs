@@ -14,7 +14,7 @@ use crate::{
 /// One of the networks.
 #[derive(Clone, Debug)]
 pub enum Network {
-    Pmp(Pmp),
+    Pmp(Box<Pmp>),
     Cil(Cil),
     Int(Int),
 }
@@ -28,7 +28,7 @@ impl Network {
     /// in another shape.
     pub fn new(cfg: &NetConfig, vb: VarBuilder) -> Result<Self> {
         Ok(match cfg {
-            NetConfig::Pmp(cfg) => Network::Pmp(Pmp::new(cfg, vb)?),
+            NetConfig::Pmp(cfg) => Network::Pmp(Box::new(Pmp::new(cfg, vb)?)),
             NetConfig::Cil(cfg) => Network::Cil(Cil::new(cfg, vb)?),
             NetConfig::Int(cfg) => Network::Int(Int::new(cfg, vb)?),
         })

@@ -1,10 +1,14 @@
 //! What is done to frames before they are learned from.
 
 use candle_core::Device::Cpu;
-use pmp::dataset::{
-    augment::AugmentConfig,
-    batch::Inputs,
-    sample::{InputSize, Sample},
+use half::f16;
+use pmp::{
+    dataset::{
+        augment::AugmentConfig,
+        batch::Inputs,
+        sample::{InputSize, Sample},
+    },
+    frame::LidarPixels,
 };
 
 use crate::samples::frame;
@@ -20,7 +24,12 @@ const EVERYTHING: AugmentConfig = AugmentConfig {
 
 fn samples(count: usize) -> Vec<Sample> {
     let size = Some(InputSize { height: 32, width: 80 });
-    vec![Sample::new(&frame(), size).unwrap(); count]
+    let mut frame = frame();
+    let pixel: Vec<u32> = (0..40).map(|i| i * 3000 + 7).collect();
+    let number = |x: f32| vec![f16::from_f32(x); pixel.len()];
+    let (x, y, z) = (number(1.0), number(-1.0), number(20.0));
+    frame.lidar = Some(LidarPixels { pixel, x, y, z });
+    vec![Sample::new(&frame, size).unwrap(); count]
 }
 
 fn stacked(augment: &AugmentConfig, seed: u64, step: u64, count: usize) -> Inputs {

@@ -36,6 +36,7 @@ mod progress;
 #[cfg(feature = "remote")]
 mod remote;
 mod rigs;
+mod control;
 mod conventions;
 mod readers;
 mod real_drive;

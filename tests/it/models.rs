@@ -16,6 +16,7 @@ use pmp::{
         mixture::Mixture,
         net_config::{Model, NetConfig, Part, PmpConfig, Preset},
         network::Network,
+        ops::gradients::backward,
         output::Output,
         pass::Pass,
         pretrained,
@@ -178,7 +179,7 @@ fn every_model_learns_a_batch_by_heart() {
             }
             let mut gradient = Gradient::default();
             let total = sums.total(&loss_config, &sums.known).unwrap();
-            gradient.add(&weights, total.backward().unwrap()).unwrap();
+            gradient.add(&weights, backward(&total).unwrap()).unwrap();
             adam.step(&gradient, 2e-3 * (1.0 - step as f64 / 400.0), 5.0).unwrap();
         }
         assert!(action < 0.01, "{model:?}: {action}");

@@ -97,7 +97,7 @@ fn batch_carries_labels_with_masks_and_sensors_with_presence() {
     let names = vec!["a/7".to_string(), "b/8".to_string()];
     let batch = Batch::stack(&samples, names, &|_| Disturbance::none(), &Cpu).unwrap();
     let second = &batch.split(2).unwrap()[1];
-    assert_eq!((second.len().unwrap(), &second.frames[..]), (1, &["b/8".to_string()][..]));
+    assert_eq!((second.size().unwrap(), &second.frames[..]), (1, &["b/8".to_string()][..]));
     let Batch { inputs, targets, .. } = batch;
     assert_eq!(inputs.camera.as_ref().unwrap().dims(), [2, 32, 80, 3]);
     assert_eq!(inputs.ralidar.as_ref().unwrap().dims(), [2, 32, 80, 4]);

@@ -40,6 +40,8 @@ struct Summary {
     norm: f64,
     sum: f64,
     entries: Vec<(usize, f64)>,
+    /// How far PyTorch's own f32 is off from its f64, relative.
+    f32_off: f64,
 }
 
 /// Name of the fixture, recipe, frames.
@@ -75,7 +77,7 @@ fn made(config: &TrainConfig, frames: usize) -> (Weights, Network, Batch) {
 #[test]
 #[ignore = "writes what tests/peers/torch_networks.py needs into the folder PMP_EXPORT"]
 fn networks_are_exported() {
-    let folder = std::env::var("PMP_EXPORT").expect("PMP_EXPORT names a folder");
+    let folder = std::env::var_os("PMP_EXPORT").expect("PMP_EXPORT names a folder");
     let folder = Path::new(&folder);
     fs::create_dir_all(folder).unwrap();
     for (name, model, preset, frames) in CASES {
@@ -135,15 +137,15 @@ fn check(name: &str, model: Model, preset: Preset, frames: usize) {
         let ours = numbers(gradient.get(parameter).unwrap());
         let norm = ours.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt();
         let what = format!("{name}: gradient of {parameter}");
-        assert!((norm - theirs.norm).abs() <= 1e-4 * theirs.norm, "{what}: {norm} {}", theirs.norm);
-        // Of a sum or an entry, relative to what a number of that gradient is like.
-        let (root, typical) = ((ours.len() as f64).sqrt(), theirs.norm);
+        // No further off than f32 is in PyTorch, which is at times much.
+        let near = (1e-4 + 2.0 * theirs.f32_off) * theirs.norm;
+        assert!((norm - theirs.norm).abs() <= near, "{what}: {norm} {}", theirs.norm);
         let sum = ours.iter().map(|g| f64::from(*g)).sum::<f64>();
         let off = (sum - theirs.sum).abs();
-        assert!(off <= 1e-4 * typical * root, "{what}: sum {sum} {}", theirs.sum);
+        assert!(off <= near * (ours.len() as f64).sqrt(), "{what}: sum {sum} {}", theirs.sum);
         for (i, entry) in &theirs.entries {
             let off = (f64::from(ours[*i]) - entry).abs();
-            assert!(off <= 1e-4 * typical, "{what}: entry {i}: {} {entry}", ours[*i]);
+            assert!(off <= near, "{what}: entry {i}: {} {entry}", ours[*i]);
         }
     }
 }

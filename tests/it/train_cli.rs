@@ -31,8 +31,33 @@ fn configuration_that_makes_no_sense_is_refused_before_anything_is_made() {
     let file = file.to_str().unwrap();
     let done = pmp_train(&["--data", "d", "--out", out, "--config", file]);
     assert_eq!(done.status.code(), Some(1));
-    assert!(stderr(&done).contains("unknown field `leraning_rate`, expected one of `model`"));
+    assert!(stderr(&done).contains("leraning_rate: there is no such key"));
     assert!(!std::path::Path::new(out).exists());
+}
+
+#[test]
+fn network_is_described_without_data() {
+    let done = pmp_train(&["--describe", "--model", "int", "--preset", "nano"]);
+    assert_eq!(done.status.code(), Some(0));
+    let text = String::from_utf8(done.stdout).unwrap();
+    let line = |name: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.starts_with(name)).unwrap();
+        line.split_whitespace().map(String::from).collect()
+    };
+    // 7 x 7 x 3 x 4 kernel, scale and shift; on 8 x 20 pixels.
+    assert_eq!(
+        line("camera.conv1 "),
+        ["camera.conv1", "8", "x", "20", "x", "4", "596", "94", "080"]
+    );
+    assert_eq!(line("action.fc1"), ["action.fc1", "3", "195", "192"]);
+    assert!(text.lines().last().unwrap().starts_with("all"));
+}
+
+#[test]
+fn only_networks_that_can_do_without_a_part_are_asked_to() {
+    let done = pmp_train(&["--describe", "--model", "cil", "--disable", "camera"]);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(stderr(&done).starts_with("error: disable: only the networks `pmp` and `blind`"));
 }
 
 #[test]

@@ -24,6 +24,9 @@ impl Conv {
     }
 }
 
+/// Writes a gradient of one argument: from all arguments and the gradient of the result.
+type Fill<'f> = &'f dyn Fn(&[&[f32]], &[f32], &mut [f32]);
+
 /// Convolve (cross-correlate, as everywhere).
 ///
 /// # Shapes
@@ -79,7 +82,7 @@ pub fn conv2d(x: &Tensor, weight: &Tensor, bias: Option<&Tensor>, conv: Conv) ->
     let (count, device) = (arguments.len(), x.device().clone());
     let back = move |grad: &Tensor| {
         let grads = Numbers::of([grad])?;
-        let tensor = |wanted: bool, shape: &Shape, fill: &dyn Fn(&[&[f32]], &[f32], &mut [f32])| {
+        let tensor = |wanted: bool, shape: &Shape, fill: Fill| {
             if !wanted {
                 return Ok(None);
             }
