@@ -217,7 +217,8 @@ fn forward_here(
     let mut size = pool.out_size().expect("it was pooled");
     let (mut kept, mut outs) = (vec![], vec![out]);
     if keep {
-        kept.push(stem);
+        // The largest activation, and a fiftieth of the work: it is convolved again on the way back.
+        kept.push(Normed { x: Buffer::passing(0), ..stem });
     } else {
         drop(stem);
     }
@@ -326,8 +327,10 @@ fn backward_here(
         out = x;
     }
     drop(out);
-    let stem = layers.pop().expect("the first layer");
-    let mut grad_stem = Buffer::any(stem.x.len());
+    let mut stem = layers.pop().expect("the first layer");
+    stem.x = Buffer::passing(stem.shape.output_len());
+    conv::forward(&stem.shape, x, weights[0].conv, None, &mut stem.x);
+    let mut grad_stem = Buffer::passing(stem.x.len());
     pooling::backward_max(&pool, &grad, &which, &mut grad_stem);
     drop(grad);
     let gate = Gate::Map(stem.map.as_affine());
