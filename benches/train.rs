@@ -138,9 +138,9 @@ fn main() {
     };
     let number = |text: &String| text.parse::<usize>().unwrap();
     let (threads, warm, steps) = (number(threads), number(warm), number(steps));
+    pmp_kernels::buffers::keep_freed_memory();
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().unwrap();
     let start = peak();
-    pmp_kernels::buffers::keep_freed_memory();
 
     let read =
         |name: &str| candle_core::safetensors::load(Path::new(folder).join(name), &Cpu).unwrap();

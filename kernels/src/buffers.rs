@@ -88,7 +88,8 @@ impl Drop for Buffer {
 
 /// Let the process keep memory that it has freed, instead of giving it back to the system and
 /// taking page faults when it asks for it again. For programs that train: tensors that are not
-/// [`Buffer`]s, such as gradients, come and go with every step. Does something with glibc only.
+/// [`Buffer`]s, such as gradients, come and go with every step. To be called
+/// before other threads are started; does something with glibc only.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     crate::foreign::keep_freed_memory();
