@@ -26,7 +26,7 @@ done
 data=$bench/loader-data peer_data=$bench/loader-peer-data
 [ -f $data/manifest.json ] || $bench/pmp-ingest-pure-rust --out $data "$log"
 [ -d $peer_data ] || $python "$peers/ingest_peer.py" "$log" --out $peer_data --reader small --jpeg turbo-scaled
-built=$(cargo bench --locked --bench loader --no-run --message-format=json | $python -c '
+built=$(cargo bench --locked --no-default-features --features learning --bench loader --no-run --message-format=json | $python -c '
 import json, sys
 lines = (json.loads(line) for line in sys.stdin)
 print([line["executable"] for line in lines if line.get("target", {}).get("name") == "loader" and line.get("executable")][-1])')

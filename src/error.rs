@@ -90,7 +90,7 @@ pub enum Error {
     Parquet { path: PathBuf, source: parquet::errors::ParquetError },
 
     /// A query over the dataset failed.
-    #[cfg(feature = "learning")]
+    #[cfg(feature = "reports")]
     #[error("query over {}: {source}", path.display())]
     Query { path: PathBuf, source: polars::error::PolarsError },
 
@@ -119,7 +119,7 @@ impl Error {
     }
 
     /// For `map_err` on polars calls.
-    #[cfg(feature = "learning")]
+    #[cfg(feature = "reports")]
     pub fn query(path: impl AsRef<Path>) -> impl FnOnce(polars::error::PolarsError) -> Self {
         let path = path.as_ref().to_path_buf();
         move |source| Error::Query { path, source }

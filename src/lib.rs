@@ -33,7 +33,7 @@ pub mod sensors;
 pub mod sim;
 #[cfg(feature = "learning")]
 pub mod model;
-#[cfg(feature = "learning")]
+#[cfg(feature = "reports")]
 pub mod stats;
 #[cfg(feature = "learning")]
 pub mod eval;

@@ -53,6 +53,7 @@ fn draw(
     let mut chart = ChartBuilder::on(panel)
         .caption(title, ("sans-serif", 15))
         .margin(8)
+        .margin_right(24)
         .x_label_area_size(24)
         .y_label_area_size(56)
         .build_cartesian_2d(0.0..last, low - margin..high + margin)?;
@@ -73,8 +74,13 @@ fn draw(
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
     }
     if !validation.is_empty() {
-        let background = WHITE.mix(0.8);
-        chart.configure_series_labels().background_style(background).border_style(WHITE).draw()?;
+        // Where a loss that falls leaves room.
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::LowerLeft)
+            .background_style(WHITE.mix(0.8))
+            .border_style(WHITE)
+            .draw()?;
     }
     Ok(())
 }

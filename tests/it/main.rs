@@ -80,7 +80,7 @@ mod map_fixtures;
 mod map_geometry;
 mod map_traps;
 mod maps;
-#[cfg(feature = "learning")]
+#[cfg(feature = "reports")]
 mod stats;
 #[cfg(feature = "learning")]
 mod whole_path;
