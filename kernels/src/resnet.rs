@@ -24,6 +24,10 @@ pub const EPS: f64 = 1e-5;
 /// Share of the batch in the moments that are kept, as in torchvision.
 pub const MOMENTUM: f64 = 0.1;
 
+/// Numbers from which on the first convolution, the largest activation and for large pictures a
+/// fiftieth of the work, is not kept but done again on the way back.
+const LARGE: usize = 1 << 22;
+
 /// Sizes of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network {
@@ -216,11 +220,10 @@ fn forward_here(
     pooling::max(&pool, stem.input(), &mut out, &mut which);
     let mut size = pool.out_size().expect("it was pooled");
     let (mut kept, mut outs) = (vec![], vec![out]);
-    if keep {
-        // The largest activation, and a fiftieth of the work: it is convolved again on the way back.
-        kept.push(Normed { x: Buffer::passing(0), ..stem });
-    } else {
-        drop(stem);
+    match keep {
+        true if stem.x.len() > LARGE => kept.push(Normed { x: Buffer::passing(0), ..stem }),
+        true => kept.push(stem),
+        false => drop(stem),
     }
     for (_, [c, o], stride) in network.blocks() {
         let x = outs.last().expect("the pooling's at least");
@@ -328,8 +331,10 @@ fn backward_here(
     }
     drop(out);
     let mut stem = layers.pop().expect("the first layer");
-    stem.x = Buffer::passing(stem.shape.output_len());
-    conv::forward(&stem.shape, x, weights[0].conv, None, &mut stem.x);
+    if stem.x.is_empty() {
+        stem.x = Buffer::passing(stem.shape.output_len());
+        conv::forward(&stem.shape, x, weights[0].conv, None, &mut stem.x);
+    }
     let mut grad_stem = Buffer::passing(stem.x.len());
     pooling::backward_max(&pool, &grad, &which, &mut grad_stem);
     drop(grad);
