@@ -160,6 +160,38 @@ def measure(folder, mode, layout, threads, warm, steps):
     print(json.dumps({"cpu": cpu, "wall": wall, "start": start, "base": base, "peak": peak_mb(), "losses": losses}))
 
 
+def check(options):
+    """The gradient of each parameter beside PyTorch's: the difference's norm over its norm."""
+    import torch
+    from safetensors.torch import load_file
+    for size in options.sizes.split(","):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            write(folder, size, None)
+            subprocess.run([options.bench, folder, "gradients", "2", "0", "0"], check=True)
+            ours = load_file(folder / "gradients.safetensors")
+            weights, batch = (load_file(folder / f"{name}.safetensors") for name in ("weights", "batch"))
+        found = {}
+        for kind in (torch.float32, torch.float64):
+            net = network(*SIZES[size][3:]).to(kind)
+            net.load_state_dict(weights, strict=False)
+            inputs = [batch[name].permute(0, 3, 1, 2) for name in ("camera", "ralidar")]
+            inputs = [x.to(kind) for x in (*inputs, batch["route"], batch["velocity"])]
+            loss_of(*net(*inputs), batch["action"].to(kind), batch["motion"].to(kind)).backward()
+            found[kind] = {name: p.grad for name, p in net.named_parameters()}
+
+        def off(some, others):
+            each = {}
+            for name, other in others.items():
+                if name != "attention.bias":  # softmax does not see it: its gradient is 0 but for rounding
+                    each[name] = ((some[name] - other).norm() / other.norm()).item()
+            worst = sorted(each, key=each.get)[::-1]
+            return f"median {statistics.median(each.values()):.1e}, worst " + ", ".join(f"{each[n]:.1e} {n}" for n in worst[:3])
+        single, double = found[torch.float32], found[torch.float64]
+        print(f"{size}: ours to PyTorch {off(ours, single)}\n  ours to f64 {off(ours, double)}\n"
+              f"  PyTorch to f64 {off(single, double)}")
+
+
 def compare(options):
     print("| size | what | threads | ours: CPU s | wall s | MB | PyTorch: CPU s | wall s | MB "
           "| channels last: CPU s | wall s | CPU ratio | wall ratio | memory ratio |")
@@ -231,7 +263,9 @@ def main():
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--steps", type=int, default=2, help="measured in each round, after one before")
-    compare(parser.parse_args())
+    parser.add_argument("--check", action="store_true", help="gradients beside PyTorch's, no times")
+    options = parser.parse_args()
+    (check if options.check else compare)(options)
 
 
 main()

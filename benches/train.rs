@@ -1,7 +1,8 @@
 //! One training step of the paper's network, and one pass of a policy: CPU time, wall time, memory.
 //!
 //! `scripts/bench_train.sh` runs it beside PyTorch, with the weights and the batch that PyTorch
-//! wrote: `train FOLDER train|forward THREADS WARM STEPS`. It prints a line of JSON.
+//! wrote: `train FOLDER train|forward THREADS WARM STEPS`. It prints a line of JSON. With `gradients`
+//! it writes those of one step beside the weights, to be held against PyTorch's.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{collections::HashMap, fs, path::Path, time::Instant};
@@ -132,14 +133,14 @@ fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let [folder, mode, threads, warm, steps] = &args[..] else {
         return println!(
-            "train FOLDER train|forward THREADS WARM STEPS; see scripts/bench_train.sh"
+            "train FOLDER train|forward|gradients THREADS WARM STEPS; see scripts/bench_train.sh"
         );
     };
     let number = |text: &String| text.parse::<usize>().unwrap();
     let (threads, warm, steps) = (number(threads), number(warm), number(steps));
+    pmp_kernels::buffers::keep_freed_memory();
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().unwrap();
     let start = peak();
-    pmp_kernels::buffers::keep_freed_memory();
 
     let read =
         |name: &str| candle_core::safetensors::load(Path::new(folder).join(name), &Cpu).unwrap();
@@ -167,6 +168,16 @@ fn main() {
     let policy = (mode == "forward").then(|| Net::new(width, feature, frozen));
     let base = peak();
 
+    if mode == "gradients" {
+        let pass = Pass::Learn { seed: 0, step: 0, part: 0 };
+        let grads = backward(&loss(&net.forward(&batch, &pass).unwrap(), &batch).unwrap()).unwrap();
+        let of = |(name, var): (&str, &candle_core::Var)| {
+            (name.to_string(), grads.get(var.as_tensor()).unwrap().clone())
+        };
+        let all: HashMap<String, Tensor> = weights.parameters().map(of).collect();
+        let file = Path::new(folder).join("gradients.safetensors");
+        return candle_core::safetensors::save(&all, file).unwrap();
+    }
     let mut moments: Vec<_> = match mode.as_str() {
         "train" => weights.parameters().map(|(_, var)| Moments::zeros(var.elem_count())).collect(),
         _ => vec![],

@@ -3,6 +3,7 @@
 # the same weights, the same batch, in turns; CPU time, wall time, memory.
 #
 #   scripts/bench_train.sh [--sizes tiny,mid,full] [--what train,forward,latency] [--threads 1,2] [--rounds N] [--steps N]
+#   scripts/bench_train.sh --check [--sizes ..]     gradients of every parameter beside PyTorch's, in f32 and f64
 #
 # Needs Python 3.9 or newer; PyTorch comes from PyPI, into target/bench/. Prints Markdown.
 set -euo pipefail

@@ -1,5 +1,5 @@
 //! Time of the layers of a ResNet34, forwards and both ways backwards, by all methods: what
-//! [`Shape::method`] is chosen by. `layers [full|mid|tiny] [rounds]`, on one thread.
+//! [`Shape::method`] is chosen by. `layers [full|mid|tiny|one] [rounds]`, on one thread.
 #![allow(clippy::print_stdout)]
 
 use pmp_kernels::conv::{self, Method, Shape};
@@ -18,6 +18,7 @@ fn main() {
     let (batch, height, width, channels) = match config.as_str() {
         "tiny" => (16, 64, 160, 16),
         "mid" => (8, 88, 200, 64),
+        "one" => (1, 88, 200, 64),
         _ => (2, 250, 600, 64),
     };
     let half = |x: usize| x.div_ceil(2);

@@ -10,7 +10,7 @@ use std::{
 };
 
 /// Most memory that lies here unused, bytes; what comes back beyond that goes to the system.
-pub const KEPT_BYTES: usize = 1 << 30;
+pub const KEPT_BYTES: usize = 1 << 28;
 
 /// Buffers in use by nobody, by their length.
 struct Free {
@@ -25,6 +25,8 @@ static FREE: Mutex<Free> = Mutex::new(Free { by_len: BTreeMap::new(), bytes: 0 }
 pub struct Buffer {
     numbers: Vec<f32>,
     len: usize,
+    /// Whether it is kept here when dropped.
+    kept: bool,
 }
 
 impl Buffer {
@@ -38,7 +40,13 @@ impl Buffer {
         let numbers = found.and_then(|(_, kept)| kept.pop());
         free.bytes -= numbers.as_ref().map_or(0, |numbers| 4 * numbers.len());
         drop(free);
-        Self { numbers: numbers.unwrap_or_else(|| vec![0.0; size]), len }
+        Self { numbers: numbers.unwrap_or_else(|| vec![0.0; size]), len, kept: true }
+    }
+
+    /// `len` zeros that go back to the allocator: for what lives from the forward pass to the way
+    /// back, and makes room there for gradients of other sizes.
+    pub fn passing(len: usize) -> Self {
+        Self { numbers: vec![0.0; len], len, kept: false }
     }
 
     /// `len` zeros.
@@ -66,6 +74,9 @@ impl DerefMut for Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         let numbers = std::mem::take(&mut self.numbers);
+        if !self.kept {
+            return;
+        }
         let mut free = lock();
         let bytes = free.bytes + 4 * numbers.len();
         if bytes <= KEPT_BYTES {
@@ -77,7 +88,8 @@ impl Drop for Buffer {
 
 /// Let the process keep memory that it has freed, instead of giving it back to the system and
 /// taking page faults when it asks for it again. For programs that train: tensors that are not
-/// [`Buffer`]s, such as gradients, come and go with every step. Does something with glibc only.
+/// [`Buffer`]s, such as gradients, come and go with every step. To be called
+/// before other threads are started; does something with glibc only.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     crate::foreign::keep_freed_memory();

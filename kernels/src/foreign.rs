@@ -76,13 +76,16 @@ pub(crate) fn keep_freed_memory() {
     // Of glibc's malloc.h.
     const TRIM_THRESHOLD: c_int = -1;
     const MMAP_MAX: c_int = -4;
+    const ARENA_MAX: c_int = -8;
     unsafe extern "C" {
         fn mallopt(parameter: c_int, value: c_int) -> c_int;
     }
     // SAFETY: glibc declares `int mallopt(int, int)`; it may be called at any time, locks what it
-    // changes, and these two parameters only tell when memory is given back to the system.
+    // changes, and these parameters only tell when memory is given back to the system and
+    // that what one thread frees another may have.
     unsafe {
         mallopt(MMAP_MAX, 0);
         mallopt(TRIM_THRESHOLD, c_int::MAX);
+        mallopt(ARENA_MAX, 1);
     }
 }

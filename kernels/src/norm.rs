@@ -212,8 +212,11 @@ impl Backward {
                 (rows.sums(Sum::Plain, grad, grad), rows.sums(Sum::Products(&mean), x, grad))
             })
             .collect();
-        let total = |of: fn(&(Vec<f32>, Vec<f32>)) -> &Vec<f32>, channel: usize| {
-            parts.iter().map(|part| f64::from(of(part)[channel])).sum::<f64>()
+        let total = |channel: usize| {
+            let wide = parts
+                .iter()
+                .map(|(plain, products)| (f64::from(plain[channel]), f64::from(products[channel])));
+            wide.fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1))
         };
         let count = (x.len() / scale.len()) as f64;
         let mut back = Self {
@@ -224,8 +227,8 @@ impl Backward {
             constant: vec![],
         };
         for (channel, deviation) in moments.deviations(eps).enumerate() {
-            let shift = total(|part| &part.0, channel);
-            let products = total(|part| &part.1, channel) / deviation;
+            let (shift, products) = total(channel);
+            let products = products / deviation;
             let of_grad = f64::from(scale[channel]) / deviation;
             let of_input = if batch { -of_grad * products / deviation / count } else { 0.0 };
             let mean = if batch { -of_grad * shift / count } else { 0.0 };

@@ -24,6 +24,10 @@ pub const EPS: f64 = 1e-5;
 /// Share of the batch in the moments that are kept, as in torchvision.
 pub const MOMENTUM: f64 = 0.1;
 
+/// Numbers from which on the first convolution, the largest activation and for large pictures a
+/// fiftieth of the work, is not kept but done again on the way back.
+const LARGE: usize = 1 << 22;
+
 /// Sizes of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network {
@@ -158,6 +162,18 @@ impl Network {
 /// If lengths disagree.
 pub fn forward(
     network: &Network,
+    size: [usize; 3],
+    x: &[f32],
+    weights: &[Weights],
+    mode: Mode,
+    keep: bool,
+) -> (Vec<f32>, Option<Tape>) {
+    // On a thread of the pool, or each operation would wake one and wait for it.
+    rayon::scope(|_| forward_here(network, size, x, weights, mode, keep))
+}
+
+fn forward_here(
+    network: &Network,
     [batch, height, width]: [usize; 3],
     x: &[f32],
     weights: &[Weights],
@@ -167,11 +183,12 @@ pub fn forward(
     let layers = network.layers();
     assert_eq!(layers.len(), weights.len(), "weights of each layer");
     let of_batch = matches!(mode, Mode::Train(_));
+    let buffer = if keep { Buffer::passing } else { Buffer::any };
     let mut at = 0;
     let mut normed = |input: Input, [height, width]: [usize; 2]| {
         let (layer, weights) = (&layers[at], &weights[at]);
         let shape = layer.shape([batch, height, width]);
-        let mut out = Buffer::any(shape.output_len());
+        let mut out = buffer(shape.output_len());
         conv::forward(&shape, input, weights.conv, None, &mut out);
         let moments = match &mut mode {
             Mode::Eval(kept) => kept[at].clone(),
@@ -198,15 +215,15 @@ pub fn forward(
         stride: [2, 2],
         padding: [1, 1],
     };
-    let mut out = Buffer::any(pool.output_len());
+    let mut out = buffer(pool.output_len());
     let mut which = vec![0; out.len()];
     pooling::max(&pool, stem.input(), &mut out, &mut which);
     let mut size = pool.out_size().expect("it was pooled");
     let (mut kept, mut outs) = (vec![], vec![out]);
-    if keep {
-        kept.push(stem);
-    } else {
-        drop(stem);
+    match keep {
+        true if stem.x.len() > LARGE => kept.push(Normed { x: Buffer::passing(0), ..stem }),
+        true => kept.push(stem),
+        false => drop(stem),
     }
     for (_, [c, o], stride) in network.blocks() {
         let x = outs.last().expect("the pooling's at least");
@@ -217,7 +234,7 @@ pub fn forward(
             Some(own) => Residual { x: &own.x, affine: Some(own.map.as_affine()) },
             None => Residual { x, affine: None },
         };
-        let mut out = Buffer::any(two.x.len());
+        let mut out = buffer(two.x.len());
         norm::apply(&two.x, two.map.as_affine(), Some(residual), true, &mut out);
         size = side(&two);
         if keep {
@@ -241,6 +258,17 @@ pub fn forward(
 ///
 /// If lengths disagree.
 pub fn backward(
+    network: &Network,
+    tape: Tape,
+    x: &[f32],
+    weights: &[Weights],
+    grad_features: &[f32],
+    of_x: bool,
+) -> (Vec<Gradients>, Option<Vec<f32>>) {
+    rayon::scope(|_| backward_here(network, tape, x, weights, grad_features, of_x))
+}
+
+fn backward_here(
     network: &Network,
     tape: Tape,
     x: &[f32],
@@ -302,8 +330,12 @@ pub fn backward(
         out = x;
     }
     drop(out);
-    let stem = layers.pop().expect("the first layer");
-    let mut grad_stem = Buffer::any(stem.x.len());
+    let mut stem = layers.pop().expect("the first layer");
+    if stem.x.is_empty() {
+        stem.x = Buffer::passing(stem.shape.output_len());
+        conv::forward(&stem.shape, x, weights[0].conv, None, &mut stem.x);
+    }
+    let mut grad_stem = Buffer::passing(stem.x.len());
     pooling::backward_max(&pool, &grad, &which, &mut grad_stem);
     drop(grad);
     let gate = Gate::Map(stem.map.as_affine());

@@ -21,6 +21,10 @@ use crate::{
 /// Channels of a result that are computed together, what `gemm` takes at once.
 const TOGETHER: usize = 64;
 
+/// Pixels that are few for a weight of rows at least [`LONG`].
+const FEW_PIXELS: usize = 96;
+const LONG: usize = 512;
+
 /// Numbers of a share's rows: half a second-level cache.
 const SHARE: usize = 1 << 17;
 
@@ -125,6 +129,9 @@ pub(crate) fn forward(
     if out.is_empty() || depth == 0 {
         return fill_rows(out, o, bias);
     }
+    if shape.batch * shape.out().iter().product::<usize>() <= FEW_PIXELS && depth >= LONG {
+        return forward_few(shape, x, weight, bias, out);
+    }
     let weight = pack(o, depth, |few, packed| {
         let weight = &weight[few.start * depth..few.end * depth];
         turn([few.len(), c, taps], |from, to| packed[to] = weight[from]);
@@ -145,6 +152,41 @@ pub(crate) fn forward(
         };
         weight.times(rows, pixels.len(), out, true);
     });
+}
+
+/// For pixels so few that bringing the weight into another order would take longer than the product:
+/// the rows are brought into its order.
+fn forward_few(shape: &Shape, x: Input, weight: &[f32], bias: Option<&[f32]>, out: &mut [f32]) {
+    const SIDE: usize = 16; // `gemm` multiplies up to 16 rows with up to 16 without packing them
+    let (c, o, taps) = (shape.channels, shape.out_channels, shape.taps());
+    let (depth, pixels) = (taps * c, out.len() / o);
+    let mut gathered = Buffer::any(pixels * depth);
+    shape.gather(&shape.picture(x), 0..pixels, &mut gathered);
+    let mut rows = Buffer::any(pixels * depth);
+    for (row, gathered) in rows.chunks_exact_mut(depth).zip(gathered.chunks_exact(depth)) {
+        for (tap, pixel) in gathered.chunks_exact(c).enumerate() {
+            pixel.iter().enumerate().for_each(|(channel, x)| row[channel * taps + tap] = *x);
+        }
+    }
+    let few = shares(o, SIDE);
+    let mut products = Buffer::any(pixels * o);
+    let parts = split(&mut products, few.iter().map(|few| few.len() * pixels));
+    few.par_iter().zip(parts).for_each(|(few, product)| {
+        for some in shares(pixels, SIDE) {
+            let numbers = &weight[few.start * depth..];
+            let left = Matrix { numbers, down: depth, right: 1 };
+            let right = Matrix { numbers: &rows[some.start * depth..], down: 1, right: depth };
+            let product = &mut product[some.start * few.len()..];
+            multiply([few.len(), some.len(), depth], left, right, product, few.len(), false);
+        }
+    });
+    fill_rows(out, o, bias);
+    for few in few {
+        let product = &products[few.start * pixels..few.end * pixels];
+        for (out, product) in out.chunks_exact_mut(o).zip(product.chunks_exact(few.len())) {
+            out[few.clone()].iter_mut().zip(product).for_each(|(out, product)| *out += product);
+        }
+    }
 }
 
 /// Rows of the bias, or zeros.

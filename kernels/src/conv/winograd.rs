@@ -246,6 +246,16 @@ pub(crate) fn backward_weight<const N: usize, const M: usize>(
     });
 }
 
+/// Write a column of rows.
+#[inline(always)]
+fn put<V: Copy, const ROWS: usize, const COLUMNS: usize>(
+    rows: &mut [[V; COLUMNS]; ROWS],
+    at: usize,
+    column: [V; ROWS],
+) {
+    rows.iter_mut().zip(column).for_each(|(row, value)| row[at] = value);
+}
+
 /// Inputs of a block to planes `[N * N][tiles][C]`.
 struct ToTiles<'a, const N: usize, const M: usize> {
     shape: &'a Shape,
@@ -300,9 +310,7 @@ impl<const N: usize, const M: usize> WithSimd for ToTiles<'_, N, M> {
                         }
                     }
                     let column = tile::input::<S, N>(simd, column);
-                    for i in 0..N {
-                        half[i][j] = column[i];
-                    }
+                    put(&mut half, j, column);
                 }
                 for (i, half) in half.into_iter().enumerate() {
                     let row = tile::input::<S, N>(simd, half);
@@ -348,9 +356,7 @@ impl<const N: usize, const M: usize> WithSimd for ToProducts<'_, N, M> {
                         }
                     }
                     let column = tile::output_adjoint::<S, N, M>(simd, column);
-                    for i in 0..N {
-                        half[i][j] = column[i];
-                    }
+                    put(&mut half, j, column);
                 }
                 for (i, half) in half.into_iter().enumerate() {
                     let row = tile::output_adjoint::<S, N, M>(simd, half);
@@ -408,9 +414,7 @@ impl<const N: usize, const M: usize> WithSimd for FromTiles<'_, N, M> {
                         *column = load(simd, numbers, (i * N + j) * plane + at);
                     }
                     let column = tile::output::<S, N, M>(simd, column);
-                    for i in 0..M {
-                        half[i][j] = column[i];
-                    }
+                    put(&mut half, j, column);
                 }
                 let channel = few.start + channel;
                 let bias = bias.map(|bias| load(simd, &bias[..few.end], channel));
@@ -465,9 +469,7 @@ impl<const N: usize> WithSimd for ToFactors<'_, N> {
                 for j in 0..3 {
                     let column = [0, 3, 6].map(|i| load(simd, &taps[i + j], 0));
                     let column = tile::kernel::<S, N>(simd, column);
-                    for i in 0..N {
-                        half[i][j] = column[i];
-                    }
+                    put(&mut half, j, column);
                 }
                 for (i, half) in half.into_iter().enumerate() {
                     let row = tile::kernel::<S, N>(simd, half);
@@ -508,9 +510,7 @@ impl<const N: usize> WithSimd for FromFactors<'_, N> {
                         *column = load(simd, planes, at);
                     }
                     let column = tile::kernel_adjoint::<S, N>(simd, column);
-                    for i in 0..3 {
-                        half[i][j] = column[i];
-                    }
+                    put(&mut half, j, column);
                 }
                 let mut taps = [[0.0; WIDEST]; 9];
                 for (i, half) in half.into_iter().enumerate() {
