@@ -7,6 +7,9 @@
 //! Small weights stay in the cache, so a block of tiles goes through all three stages at once.
 //! Large ones are brought into planes for a few channels at a time and multiplied with all tiles.
 
+// Rows and columns of small matrices are counted, not walked.
+#![allow(clippy::needless_range_loop)]
+
 use std::ops::Range;
 
 use pulp::{Simd, WithSimd};

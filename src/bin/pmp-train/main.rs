@@ -53,6 +53,8 @@ Every key with its meaning is in schemas/train.toml, every key with its value in
 Exit codes: 0 trained; 1 error, the run stands at its last checkpoint; 2 bad usage";
 
 fn main() -> ExitCode {
+    // Before there are other threads: a step frees and takes the same large buffers as the last.
+    pmp_kernels::buffers::keep_freed_memory();
     let Args { command, train } = Args::parse();
     cli::main(|| match command {
         Some(Command::Sweep(args)) => sweep::run(&args),
