@@ -1,9 +1,8 @@
 //! How often frames are shown: rare kinds of moments more often than they are.
 //!
 //! A frame counts by its rarest trait: its weight is the largest, over the traits, of (even share
-//! / share of its kind) to the power of the strength. Weights have a mean of 1, so that an epoch
-//! stays as long as it is, and at most [`MAX_WEIGHT`], so that no single moment is learned by
-//! heart.
+//! / share of its kind) to the power of the strength, at most 10, so that no single moment is
+//! learned by heart. Then weights are brought to a mean of 1: an epoch stays as long as it is.
 
 use std::fmt::Write as _;
 

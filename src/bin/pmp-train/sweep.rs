@@ -18,17 +18,10 @@ use crate::{options::use_threads, train::watched};
 
 /// Train every combination of some values, one run after the other
 ///
-/// FILE is a configuration (schemas/train.toml) with a table of lists:
-///
-///   preset = "tiny"
-///   [grid]
-///   lr = [1e-3, 3e-4]
-///   "net.modes" = [1, 3]
-///
 /// Each run has its directory in OUT, named by its values. Stopped at any moment, the same command
 /// goes on where it was. The last validations are printed as a table, and kept as OUT/sweep.md.
 #[derive(Args)]
-#[command(verbatim_doc_comment)]
+#[command(after_help = GRID)]
 pub(crate) struct Sweep {
     /// Dataset to train on
     #[arg(short, long, value_name = "DATASET")]
@@ -38,7 +31,7 @@ pub(crate) struct Sweep {
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
 
-    /// TOML file with the configuration and its [grid]
+    /// TOML file with the configuration and its grid
     #[arg(long, value_name = "FILE")]
     grid: PathBuf,
 
@@ -54,6 +47,14 @@ pub(crate) struct Sweep {
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
 }
+
+const GRID: &str = "\
+FILE is a configuration (schemas/train.toml) with a table of lists:
+
+  preset = \"tiny\"
+  [grid]
+  lr = [1e-3, 3e-4]
+  \"net.modes\" = [1, 3]";
 
 pub(crate) fn run(args: &Sweep) -> Result<Outcome> {
     use_threads(args.jobs)?;
