@@ -26,7 +26,7 @@ from werkzeug.serving import WSGIRequestHandler, make_server
 BUCKET = "bucket"
 
 requests = []
-held = {"text": ""}
+held = {"text": "", "waiting": 0}
 changed = threading.Condition()
 
 
@@ -39,11 +39,19 @@ class Watched:
     def __call__(self, environ, start_response):
         path, method = environ["PATH_INFO"], environ["REQUEST_METHOD"]
         with changed:
-            if method == "PUT":
+            was_held = method == "PUT" and held["text"] and held["text"] in path
+            if was_held:
+                held["waiting"] += 1
                 changed.wait_for(lambda: not held["text"] or held["text"] not in path)
             if path.startswith(f"/{BUCKET}/"):
                 requests.append([method, path.removeprefix(f"/{BUCKET}/")])
-        return self.app(environ, start_response)
+        try:
+            return self.app(environ, start_response)
+        finally:
+            if was_held:
+                with changed:
+                    held["waiting"] -= 1
+                    changed.notify_all()
 
 
 class Quiet(WSGIRequestHandler):
@@ -91,6 +99,8 @@ def main():
                 with changed:
                     held["text"] = text
                     changed.notify_all()
+                    # Those that were let go are through, whoever sent them may be dead.
+                    changed.wait_for(lambda: text or held["waiting"] == 0, timeout=30)
             case ["lock"]:
                 reset = urllib.request.Request(f"{endpoint}/moto-api/reset-auth", data=b"0", headers={"Content-Type": "text/plain"})
                 urllib.request.urlopen(reset).read()
