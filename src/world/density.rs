@@ -1,4 +1,4 @@
-//! How much traffic: the paper's levels (table II; "few" as PAPER.md U24 settles it).
+//! How much traffic: the paper's levels (table II; "few" has no numbers there and is ours).
 
 use std::ops::RangeInclusive;
 

@@ -11,10 +11,10 @@ use crate::{
     },
 };
 
-/// The goal is reached this near to it, m (PAPER.md U30).
+/// The goal is reached this near to it, m: as far ahead as the paper's controller aims.
 pub const GOAL_M: f64 = 5.0;
 
-/// Time limit: the route at this speed, and then some (PAPER.md U29).
+/// Time limit: the route at this speed, and then some (NoCrash's formula, at twice its speed).
 pub const SLOWEST_MPS: f64 = 10.0 / 3.6;
 pub const GRACE_S: f64 = 20.0;
 

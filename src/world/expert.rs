@@ -1,6 +1,6 @@
 //! The expert: follows its route at about 40 km/h, 15 at junctions, and touches nobody.
 //!
-//! It sees the state of the world, not its sensors (paper, section III.B; PAPER.md U19).
+//! It sees the state of the world, not its sensors (paper, section III.B).
 
 use glam::DVec2;
 

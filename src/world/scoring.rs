@@ -1,4 +1,4 @@
-//! What is counted of a drive, in steps of 0.1 s (SIMULATOR.md section 5 and the paper's IV.B1).
+//! What is counted of a drive, in steps of 0.1 s (the paper's IV.B1).
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};

@@ -63,7 +63,7 @@ pub struct CameraConfig {
 }
 
 impl Default for CameraConfig {
-    /// 600 x 250, 100 degrees wide, level, behind the windscreen (PAPER.md U20).
+    /// 600 x 250, 100 degrees wide, level, behind the windscreen.
     fn default() -> CameraConfig {
         let rotation = DQuat::from_xyzw(-0.5, 0.5, -0.5, 0.5);
         CameraConfig {
