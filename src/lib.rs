@@ -13,6 +13,7 @@
 //! (`tests/it/architecture.rs` checks that).
 
 pub mod error;
+pub mod digits;
 pub mod atomic;
 pub mod remote;
 pub mod projection;

@@ -1,7 +1,7 @@
 //! What trains a convolutional network on the CPU: slices in, slices out.
 //!
 //! ```text
-//! buffers, pieces, simd, matrix products
+//! buffers, pieces, simd, matrix products, windows
 //!   -> conv    forward, gradients of input, weight and bias
 //!   -> norm    batch norm with residual addition and ReLU, both passes
 //!   -> pooling maximum and mean
@@ -22,6 +22,7 @@ mod foreign;
 pub mod buffers;
 mod pieces;
 mod simd;
+mod window;
 pub mod conv;
 pub mod norm;
 pub mod pooling;

@@ -7,6 +7,7 @@ use crate::{
     conv::Input,
     norm::Affine,
     simd::{load, store, widest},
+    window::out_size,
 };
 
 /// Sizes of a pooling by maximum.
@@ -27,11 +28,7 @@ pub struct Shape {
 impl Shape {
     /// Height and width of the result; `None` if the padded picture is smaller than the kernel.
     pub fn out_size(&self) -> Option<[usize; 2]> {
-        let side = |side: usize, i: usize| {
-            let room = (side + 2 * self.padding[i]).checked_sub(self.kernel[i])?;
-            Some(room / self.stride[i] + 1)
-        };
-        Some([side(self.height, 0)?, side(self.width, 1)?])
+        out_size([self.height, self.width], self.kernel, self.stride, self.padding)
     }
 
     /// Numbers of the input.

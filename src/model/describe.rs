@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::digits::grouped;
+
 /// A layer, for one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layer {
@@ -34,15 +36,16 @@ impl Layer {
 /// The layers in the way of the data, with sums at the end.
 pub fn table(layers: &[Layer]) -> String {
     let shape = |layer: &Layer| layer.output.iter().map(usize::to_string).collect::<Vec<_>>();
+    let count = |number: usize| grouped(number as u64);
     let rows: Vec<[String; 4]> = layers
         .iter()
         .map(|layer| {
-            let (parameters, cost) = (grouped(layer.parameters), grouped(layer.multiply_adds));
+            let (parameters, cost) = (count(layer.parameters), count(layer.multiply_adds));
             [layer.name.clone(), shape(layer).join(" x "), parameters, cost]
         })
         .collect();
     let head = ["layer", "output of one frame", "parameters", "multiply-adds"].map(String::from);
-    let sum = |each: fn(&Layer) -> usize| grouped(layers.iter().map(each).sum());
+    let sum = |each: fn(&Layer) -> usize| count(layers.iter().map(each).sum());
     let foot = ["all".into(), String::new(), sum(|l| l.parameters), sum(|l| l.multiply_adds)];
     let all: Vec<_> = [&head].into_iter().chain(&rows).chain([&foot]).collect();
     let width = |i: usize| all.iter().map(|row| row[i].len()).max().unwrap_or(0);
@@ -51,19 +54,6 @@ pub fn table(layers: &[Layer]) -> String {
     for row in all {
         let [a, b, c, d] = widths;
         let _ = writeln!(text, "{:<a$}  {:>b$}  {:>c$}  {:>d$}", row[0], row[1], row[2], row[3]);
-    }
-    text
-}
-
-/// 1234567 as `1 234 567`.
-fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
     }
     text
 }

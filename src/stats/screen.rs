@@ -2,7 +2,10 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use crate::stats::summary::{Group, Groups, LeftOut, Loss, Part, Quantiles, Summary};
+use crate::{
+    digits::grouped,
+    stats::summary::{Group, Groups, LeftOut, Loss, Part, Quantiles, Summary},
+};
 
 /// Shown where there is no number.
 const NOTHING: &str = "–";
@@ -230,17 +233,4 @@ fn fixed(value: f64, decimals: usize) -> String {
         Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.into(),
         _ => text,
     }
-}
-
-/// `1 234 567`.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(' ');
-        }
-        text.push(digit);
-    }
-    text
 }

@@ -9,7 +9,7 @@ mod winograd;
 
 use rayon::prelude::*;
 
-use crate::{norm::Affine, pieces};
+use crate::{norm::Affine, pieces, window::out_size};
 
 /// Sizes of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,11 +57,7 @@ impl<'a> From<&'a [f32]> for Input<'a> {
 impl Shape {
     /// Height and width of the result; `None` if the padded picture is smaller than the kernel.
     pub fn out_size(&self) -> Option<[usize; 2]> {
-        let side = |side: usize, i: usize| {
-            let room = (side + 2 * self.padding[i]).checked_sub(self.kernel[i])?;
-            Some(room / self.stride[i] + 1)
-        };
-        Some([side(self.height, 0)?, side(self.width, 1)?])
+        out_size([self.height, self.width], self.kernel, self.stride, self.padding)
     }
 
     /// Numbers of the input.
