@@ -58,6 +58,11 @@ pub struct Frame {
     pub perturbed: bool,
 }
 
+/// Planar speed in m/s, negative when reversing: the convention of [`Future::speed_mps`].
+pub fn signed_speed_mps([vx, vy]: [f32; 2]) -> f32 {
+    if vx < 0.0 { -vx.hypot(vy) } else { vx.hypot(vy) }
+}
+
 /// Lidar returns on the picture, the nearest per pixel, ascending in `pixel`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LidarPixels {

@@ -32,11 +32,11 @@ pub mod world;
 pub mod scene;
 pub mod sensors;
 pub mod sim;
+pub mod closed_loop;
 #[cfg(feature = "learning")]
 pub mod model;
 #[cfg(feature = "reports")]
 pub mod stats;
-#[cfg(feature = "learning")]
 pub mod eval;
 pub mod cli;
 pub mod ingest_progress;

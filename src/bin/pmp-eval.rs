@@ -12,10 +12,14 @@ use pmp::{
     dataset::open,
     error::{Error, Result},
     eval::{
-        baseline, offline, render,
-        report::{Dataset, Holdout, HoldoutKind, Report},
+        baseline,
+        offline::{
+            evaluate::evaluate,
+            render,
+            report::{Dataset, Holdout, HoldoutKind, Report},
+            store, summary,
+        },
         statistics::Bootstrap,
-        store, summary,
     },
     model::learned::Learned,
     policy::Policy,
@@ -129,7 +133,7 @@ fn offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<
     let holdout = holdout(&dataset)?;
     let bar = cli::progress(holdout.frames, "frames", "evaluating");
     let frames = dataset.frames(&dataset.val).inspect(|_| bar.inc(1));
-    let errors = offline::evaluate(&mut policies, frames)?;
+    let errors = evaluate(&mut policies, frames)?;
     bar.finish_and_clear();
     let report = summary::summarise(Dataset::of(data)?, holdout, &errors, Bootstrap::default());
     store::write(out, &report, &errors)?;

@@ -2,8 +2,7 @@
 
 use crate::{
     error::Result,
-    eval::metrics::signed_speed_mps,
-    frame::{FUTURE_STEPS, Frame},
+    frame::{FUTURE_STEPS, Frame, signed_speed_mps},
     policy::{Action, Mode, Plan, Policy},
 };
 

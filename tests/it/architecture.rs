@@ -11,8 +11,14 @@ use std::{
 };
 
 /// Rooms that must not know each other although the order would allow it: user, used.
-const STRANGERS: [(&str, &str); 4] =
-    [("sim", "model"), ("model", "sim"), ("eval", "model"), ("eval", "sim")];
+const STRANGERS: [(&str, &str); 6] = [
+    ("sim", "model"),
+    ("model", "sim"),
+    ("model", "closed_loop"),
+    ("closed_loop", "model"),
+    ("eval", "model"),
+    ("eval", "sim"),
+];
 
 /// Names that say nothing of what a file holds.
 const VAGUE: [&str; 8] = ["util", "utils", "helper", "helpers", "common", "misc", "base", "core"];

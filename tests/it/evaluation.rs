@@ -7,14 +7,16 @@ use pmp::{
     error::Result,
     eval::{
         baseline::{self, baseline},
-        definitions::{METRICS, metric},
-        metrics::{self, FrameErrors},
-        offline::{Errors, evaluate},
+        offline::{
+            definitions::{METRICS, metric},
+            evaluate::{Errors, evaluate},
+            metrics::{self, FrameErrors},
+        },
         statistics::Bootstrap,
     },
     frame::{
         Command, Conditions, FUTURE_STEPS, Frame, Future, ROUTE_POINTS, RecordedAction, Route,
-        RouteSource, Skew,
+        RouteSource, Skew, signed_speed_mps,
     },
     policy::{Action, Mode, ModeStd, Plan, Policy},
 };
@@ -163,7 +165,7 @@ fn every_listed_baseline_exists_and_no_other() {
 
 #[test]
 fn reversing_keeps_its_sign() {
-    assert_eq!(metrics::signed_speed_mps([-3.0, 4.0]), -5.0);
+    assert_eq!(signed_speed_mps([-3.0, 4.0]), -5.0);
     let mut frame = accelerating(0, 2.0, 0.0);
     frame.velocity_mps = [-2.0, 0.0];
     frame.future.speed_mps = [-2.0; FUTURE_STEPS];

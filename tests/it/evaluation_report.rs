@@ -16,16 +16,17 @@ use pmp::{
     error::Result,
     eval::{
         baseline::baseline,
-        definitions::METRICS,
-        metrics::signed_speed_mps,
-        offline::{Errors, evaluate},
-        plot, render,
-        report::{Dataset, Holdout, HoldoutKind, Report, Verdict},
+        offline::{
+            definitions::METRICS,
+            evaluate::{Errors, evaluate},
+            plot, render,
+            report::{Dataset, Holdout, HoldoutKind, Report, Verdict},
+            store,
+            summary::summarise,
+        },
         statistics::{Bootstrap, Unit},
-        store,
-        summary::summarise,
     },
-    frame::Frame,
+    frame::{Frame, signed_speed_mps},
     policy::{Plan, Policy},
 };
 use serde_json::Value;

@@ -41,7 +41,6 @@ mod control;
 mod conventions;
 mod readers;
 mod real_drive;
-#[cfg(feature = "learning")]
 mod evaluation;
 #[cfg(feature = "learning")]
 mod evaluation_report;

@@ -7,7 +7,7 @@ use self::{
     Aggregate::{Mean, RootMeanSquare},
     Better::{Lower, Near},
 };
-use crate::eval::metrics::FrameErrors;
+use crate::eval::offline::metrics::FrameErrors;
 
 /// Which way a metric is good.
 #[derive(Clone, Copy, Debug, PartialEq)]

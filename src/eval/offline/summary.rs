@@ -8,12 +8,14 @@ use sha2::{Digest as _, Sha256};
 use crate::{
     eval::{
         baseline::REFERENCE,
-        definitions::{Aggregate, HEADLINE, METRICS, Metric, metric},
-        metrics::FrameErrors,
-        offline::{Errors, FrameKey, PolicyErrors},
-        report::{
-            Dataset, Definition, Estimate, Evaluated, Holdout, Intervals, Paired, PolicyReport,
-            Report, Slice, VERSION, Verdict,
+        offline::{
+            definitions::{Aggregate, HEADLINE, METRICS, Metric, metric},
+            evaluate::{Errors, FrameKey, PolicyErrors},
+            metrics::FrameErrors,
+            report::{
+                Dataset, Definition, Estimate, Evaluated, Holdout, Intervals, Paired, PolicyReport,
+                Report, Slice, VERSION, Verdict,
+            },
         },
         statistics::{Bootstrap, FEWEST_UNITS, Unit, mean, units_with_a_value},
     },
@@ -27,7 +29,7 @@ const SPEED_BINS_MPS: [(&str, f32, f32); 4] =
 /// Length of a block of frames, ns: the 3 s over which neighbouring frames share their future.
 const BLOCK_NS: i64 = 3_000_000_000;
 
-/// Summarise what [`evaluate`](crate::eval::offline::evaluate) found.
+/// Summarise what [`evaluate`](crate::eval::offline::evaluate::evaluate) found.
 pub fn summarise(
     dataset: Dataset,
     holdout: Holdout,

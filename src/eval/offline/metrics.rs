@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use crate::{
-    frame::{FUTURE_STEPS, Frame, Future, RecordedAction},
+    frame::{FUTURE_STEPS, Frame, Future, RecordedAction, signed_speed_mps},
     policy::{Action, Mode, Plan},
 };
 
@@ -76,11 +76,6 @@ impl FrameErrors {
         }
         errors
     }
-}
-
-/// Planar speed in m/s, negative when reversing: the convention of [`Future::speed_mps`].
-pub fn signed_speed_mps([vx, vy]: [f32; 2]) -> f32 {
-    if vx < 0.0 { -vx.hypot(vy) } else { vx.hypot(vy) }
 }
 
 /// Absolute errors of steer, throttle and brake (dimensionless), where the log has the channel.

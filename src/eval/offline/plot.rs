@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use crate::eval::{
     baseline::REFERENCE,
-    report::{Estimate, PolicyReport, Report},
+    offline::report::{Estimate, PolicyReport, Report},
 };
 
 /// Metric at each horizon, and how the horizon is written.

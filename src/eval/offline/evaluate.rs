@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 
 use crate::{
     error::{Error, Result},
-    eval::metrics::{FrameErrors, signed_speed_mps},
-    frame::{Command, Frame},
+    eval::offline::metrics::FrameErrors,
+    frame::{Command, Frame, signed_speed_mps},
     policy::{Mode, Plan, Policy},
 };
 

@@ -18,9 +18,9 @@ use parquet::{
 use crate::{
     atomic::{self, AtomicFile},
     error::{Error, Result},
-    eval::{
+    eval::offline::{
         definitions::{Aggregate, METRICS, Metric},
-        offline::{Errors, PolicyErrors},
+        evaluate::{Errors, PolicyErrors},
         plot, render,
         report::{Dataset, Report, VERSION},
     },

@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use crate::eval::{
+use crate::eval::offline::{
     definitions::HEADLINE,
     report::{Estimate, PolicyReport, Report},
 };

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     error::{Error, Result},
     eval::{
-        definitions::METRICS,
+        offline::definitions::METRICS,
         statistics::{Bootstrap, Unit},
     },
 };
@@ -181,7 +181,7 @@ pub enum Verdict {
 impl Definition {
     /// All of [`METRICS`].
     pub fn all() -> Vec<Definition> {
-        let of = |metric: &crate::eval::definitions::Metric| Definition {
+        let of = |metric: &crate::eval::offline::definitions::Metric| Definition {
             key: metric.key.to_string(),
             title: metric.title.to_string(),
             unit: metric.unit.to_string(),

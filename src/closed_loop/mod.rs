@@ -1,0 +1,6 @@
+//! The closed loop: a policy drives in the simulator, and what came of it is counted.
+//!
+//! An episode's sums are kept in one [`row`], from which every table can be made without driving
+//! again.
+
+pub mod row;
