@@ -12,7 +12,7 @@ use pmp::{
     sensors::radar::direction,
     sim::{
         clocks::{STEPS_PER_S, Source},
-        drive::Drive,
+        drive::Demonstration,
         reading::Reading,
         senses::Senses,
     },
@@ -39,19 +39,20 @@ pub(crate) struct Known {
     pub(crate) snapshot: Snapshot,
 }
 
-fn drive() -> Drive {
+fn drive() -> Demonstration {
     let shared = shared();
-    Drive::new(&shared.stage.town, &shared.episode, Shared::BURST_CHANCE).unwrap()
+    Demonstration::new(&shared.stage.town, &shared.episode, Shared::BURST_CHANCE).unwrap()
 }
 
 /// Every step of the shared episode.
 pub(crate) fn known() -> &'static [Known] {
     static KNOWN: OnceLock<Vec<Known>> = OnceLock::new();
     KNOWN.get_or_init(|| {
-        let mut drive = drive();
+        let mut demonstration = drive();
         let steps = (SECONDS * STEPS_PER_S as f64) as usize;
         let mut known = Vec::new();
         for _ in 0..=steps {
+            let drive = &demonstration.drive;
             let world = &drive.world;
             let waypoint = world.route.at(world.progress_m());
             known.push(Known {
@@ -64,7 +65,7 @@ pub(crate) fn known() -> &'static [Known] {
                 route: world.route.local(world.progress_m(), world.ego()).unwrap(),
                 snapshot: world.snapshot(),
             });
-            drive.step();
+            demonstration.step();
         }
         known
     })
@@ -193,13 +194,14 @@ fn radar_speeds_in_log_and_frames_are_the_relative_radial_speeds_of_who_was_hit(
     assert!(scans.len() >= 90);
     let rig = exact_rig();
     let mut again = drive();
-    let mut senses = Senses::new(&rig, &shared.stage, &shared.shapes, &shared.episode, &again);
+    let mut senses =
+        Senses::new(&rig, &shared.stage, &shared.shapes, &shared.episode, &again.drive);
     let mut moving = 0;
     for (step, returns) in &scans {
-        while (again.steps() as usize) < *step {
+        while (again.drive.steps() as usize) < *step {
             again.step();
         }
-        let Reading::Radar(expected) = senses.read(Source::Radar, &again) else { panic!() };
+        let Reading::Radar(expected) = senses.read(Source::Radar, &again.drive) else { panic!() };
         assert_eq!(returns.len(), expected.len(), "step {step}");
         let now = &known[*step];
         // Velocity of the radar by its place a step ago and now.
