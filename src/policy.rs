@@ -74,6 +74,19 @@ impl Mode {
     }
 }
 
+/// Sensors that a policy looks at. Velocity, route and command are always there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Senses {
+    pub camera: bool,
+    /// Lidar and radar.
+    pub ranging: bool,
+}
+
+impl Senses {
+    pub const ALL: Senses = Senses { camera: true, ranging: true };
+    pub const NONE: Senses = Senses { camera: false, ranging: false };
+}
+
 /// Something that drives.
 ///
 /// A policy looks at what the car sensed, its state, its route and its command. It must not look
@@ -93,6 +106,11 @@ pub trait Policy {
     /// If the frame cannot be used: a picture that cannot be decoded, a tensor operation that
     /// fails.
     fn plan(&mut self, frame: &Frame) -> Result<Plan>;
+
+    /// What the policy looks at; the rest of a frame need not be there.
+    fn senses(&self) -> Senses {
+        Senses::ALL
+    }
 
     /// Whether the policy reads what the recorded driver did next: an oracle, not a driver.
     fn sees_the_future(&self) -> bool {

@@ -19,7 +19,7 @@ use crate::{
         pass::Pass,
         run,
     },
-    policy::{Action, Mode, ModeStd, Plan, Policy},
+    policy::{Action, Mode, ModeStd, Plan, Policy, Senses},
 };
 
 /// A run directory that drives. It looks at one frame at a time and remembers nothing.
@@ -71,6 +71,10 @@ impl Policy for Learned {
     }
 
     fn reset(&mut self) {}
+
+    fn senses(&self) -> Senses {
+        self.net.senses()
+    }
 
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let output = self.output(frame)?;

@@ -7,7 +7,7 @@ use foxglove::messages::PointCloud;
 use glam::{DAffine3, DVec3};
 use mcap::MessageStream;
 use pmp::{
-    dataset::ego::wrap_angle,
+    dataset::ego::{EgoState, wrap_angle},
     frame::{self, Command, Frame, RouteSource},
     sensors::radar::direction,
     sim::{
@@ -39,6 +39,15 @@ pub(crate) struct Known {
     pub(crate) snapshot: Snapshot,
 }
 
+/// Where a car is, by the words of frames.
+pub(crate) fn state_of(car: &Car, ground_m: f64) -> EgoState {
+    EgoState {
+        position_m: car.position_m.extend(ground_m),
+        yaw_rad: car.yaw_rad,
+        velocity_mps: car.velocity_ego_mps().to_array(),
+    }
+}
+
 fn drive() -> Demonstration {
     let shared = shared();
     Demonstration::new(&shared.stage.town, &shared.episode, Shared::BURST_CHANCE).unwrap()
@@ -62,7 +71,10 @@ pub(crate) fn known() -> &'static [Known] {
                 in_junction: waypoint.in_junction,
                 limit_mps: waypoint.limit_mps,
                 command: waypoint.command,
-                route: world.route.local(world.progress_m(), world.ego()).unwrap(),
+                route: {
+                    let now = state_of(world.ego(), world.ground_m());
+                    world.route.local(world.progress_m(), &now).unwrap()
+                },
                 snapshot: world.snapshot(),
             });
             demonstration.step();
