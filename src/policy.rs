@@ -19,6 +19,14 @@ pub struct Action {
     pub brake: f32,
 }
 
+impl Action {
+    /// Why it is none, if it is none.
+    pub fn fault(&self) -> Option<&'static str> {
+        let is_finite = [self.steer, self.throttle, self.brake].iter().all(|v| v.is_finite());
+        (!is_finite).then_some("planned an action that is not finite")
+    }
+}
+
 /// One manoeuvre over the next 3 s: independent normals per step for speed and yaw change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
@@ -55,6 +63,38 @@ impl Plan {
     /// The mode of the highest weight, the first of equals.
     pub fn strongest(&self) -> Option<&Mode> {
         self.motion.iter().reduce(|best, mode| if mode.weight > best.weight { mode } else { best })
+    }
+
+    /// Why a plan is none, if it is none. A value that is not finite would spread into every mean,
+    /// and leaving its frame out would flatter the policy.
+    pub fn fault(&self) -> Option<&'static str> {
+        let finite = |mode: &Mode| {
+            mode.weight.is_finite()
+                && mode.speed_mps.iter().chain(&mode.yaw_rad).all(|value| value.is_finite())
+        };
+        let positive = |mode: &Mode| {
+            mode.std.as_ref().is_none_or(|std| {
+                std.speed_mps
+                    .iter()
+                    .chain(&std.yaw_rad)
+                    .all(|value| value.is_normal() && *value > 0.0)
+            })
+        };
+        let action = self.action.unwrap_or_default();
+        let weights: f32 = self.motion.iter().map(|mode| mode.weight).sum();
+        if let Some(fault) = action.fault() {
+            Some(fault)
+        } else if !self.motion.iter().all(finite) {
+            Some("planned a motion that is not finite")
+        } else if !self.motion.iter().all(positive) {
+            Some("planned a standard deviation that is not positive and finite")
+        } else if self.motion.iter().any(|mode| mode.weight < 0.0)
+            || (!self.motion.is_empty() && (weights - 1.0).abs() > 1e-3)
+        {
+            Some("planned modes whose weights are no probabilities")
+        } else {
+            None
+        }
     }
 }
 

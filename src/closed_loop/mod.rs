@@ -11,4 +11,15 @@
 //! again.
 
 pub mod row;
+pub mod suite;
 pub mod observation;
+pub mod pilot;
+pub mod oracle;
+pub mod safety;
+pub mod comfort;
+pub mod tally;
+pub mod film;
+pub mod strip;
+pub mod thought;
+pub mod recorder;
+pub mod outing;

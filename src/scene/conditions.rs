@@ -75,3 +75,14 @@ pub struct Sky {
     pub illumination: Illumination,
     pub weather: Weather,
 }
+
+impl Sky {
+    /// The sky of a name: weather, then illumination, as `storm-dark`.
+    pub fn from_name(name: &str) -> Option<Sky> {
+        let (weather, illumination) = name.split_once('-')?;
+        Some(Sky {
+            illumination: Illumination::ALL.into_iter().find(|i| i.name() == illumination)?,
+            weather: Weather::ALL.into_iter().find(|w| w.name() == weather)?,
+        })
+    }
+}

@@ -149,8 +149,8 @@ fn words(episode: &Episode, recipe: &Recipe) -> BTreeMap<String, String> {
     words.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect()
 }
 
-/// How the drive ended, and how far it came.
-fn outcome(drive: &Drive) -> BTreeMap<String, String> {
+/// How the drive ended, and how far it came, as key and value.
+pub fn outcome(drive: &Drive) -> BTreeMap<String, String> {
     let world = &drive.world;
     let end = drive.end().map_or("cut-off", |end| end.name());
     let words = [
