@@ -23,3 +23,5 @@ pub mod strip;
 pub mod thought;
 pub mod recorder;
 pub mod outing;
+pub mod timing;
+pub mod contest;

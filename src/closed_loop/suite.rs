@@ -9,7 +9,7 @@ use std::{
     sync::Arc,
 };
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     error::{Error, Result},
@@ -34,7 +34,7 @@ const SUITES: [(&str, &str); 1] =
 const VERSION: u32 = 1;
 
 /// Episodes to drive.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Suite {
     pub name: String,
     pub seed: u64,
@@ -45,7 +45,7 @@ pub struct Suite {
 }
 
 /// An episode of a suite.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Episode {
     /// The group of tasks that it belongs to.
     pub condition: String,

@@ -79,18 +79,8 @@ impl Tally {
         let end = drive.end();
         let contact = world.contact();
         let comfort = comfort::judge(&self.motion);
-        let Sky { illumination, weather } = episode.sky;
         let [camera, ralidar, route, velocity] = self.attention_sums;
         EpisodeRow {
-            policy: policy.to_string(),
-            suite: suite.to_string(),
-            condition: episode.condition.clone(),
-            town: episode.town.clone(),
-            traffic: episode.traffic.name().to_string(),
-            weather: weather.name().to_string(),
-            illumination: illumination.name().to_string(),
-            episode: episode.number,
-            seed: episode.seed,
             vehicles: world.counts().vehicles as u32,
             pedestrians: world.counts().walkers as u32,
             route_m: world.route.length_m(),
@@ -131,7 +121,25 @@ impl Tally {
             attention_ralidar_sum: ralidar,
             attention_route_sum: route,
             attention_velocity_sum: velocity,
+            ..begun(policy, suite, episode)
         }
+    }
+}
+
+/// The row of an episode of which nothing is known but which it is.
+pub fn begun(policy: &str, suite: &str, episode: &Episode) -> EpisodeRow {
+    let Sky { illumination, weather } = episode.sky;
+    EpisodeRow {
+        policy: policy.to_string(),
+        suite: suite.to_string(),
+        condition: episode.condition.clone(),
+        town: episode.town.clone(),
+        traffic: episode.traffic.name().to_string(),
+        weather: weather.name().to_string(),
+        illumination: illumination.name().to_string(),
+        episode: episode.number,
+        seed: episode.seed,
+        ..EpisodeRow::default()
     }
 }
 

@@ -70,7 +70,7 @@ impl Weather {
 }
 
 /// Light and weather of an episode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Sky {
     pub illumination: Illumination,
     pub weather: Weather,
