@@ -8,7 +8,7 @@
 //! ```
 //!
 //! An episode's sums are kept in one [`row`], from which every table can be made without driving
-//! again.
+//! again; [`results`] keeps the rows.
 
 pub mod row;
 pub mod suite;
@@ -24,4 +24,5 @@ pub mod thought;
 pub mod recorder;
 pub mod outing;
 pub mod timing;
+pub mod results;
 pub mod contest;

@@ -43,6 +43,11 @@ impl Network {
         }
     }
 
+    /// Whether it gives a mixture over future motion.
+    pub fn plans_motion(&self) -> bool {
+        matches!(self, Network::Pmp(_))
+    }
+
     /// What the network looks at.
     pub fn senses(&self) -> Senses {
         match self {
