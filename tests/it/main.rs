@@ -75,6 +75,7 @@ mod one_pixel;
 #[cfg(feature = "learning")]
 mod operations;
 mod replay;
+mod closed_loop;
 mod ranging;
 mod camera;
 mod map_fixtures;
