@@ -48,7 +48,10 @@ impl Bootstrap {
         let width = groups.iter().flatten().map(Vec::len).next().unwrap_or(0);
         let mut parts = vec![0usize; width];
         for unit in groups.iter().flatten() {
-            parts.iter_mut().zip(unit).for_each(|(part, term)| *part += usize::from(term.is_some()));
+            parts
+                .iter_mut()
+                .zip(unit)
+                .for_each(|(part, term)| *part += usize::from(term.is_some()));
         }
         let groups: Vec<Vec<Vec<[f64; 2]>>> = groups
             .iter()
