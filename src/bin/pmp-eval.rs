@@ -9,17 +9,20 @@ use candle_core::Device;
 use clap::{Parser, Subcommand, ValueEnum};
 use pmp::{
     cli::{self, Outcome},
+    closed_loop::results,
     dataset::open,
     error::{Error, Result},
     eval::{
         baseline,
         offline::{
+            self,
             evaluate::evaluate,
             render,
             report::{Dataset, Holdout, HoldoutKind, Report},
-            store, summary,
+            store,
         },
         statistics::Bootstrap,
+        table::{self, csv, episodes::Group, latex, markdown, paper::Paper, summary},
     },
     model::learned::Learned,
     policy::Policy,
@@ -55,16 +58,31 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 0)]
         jobs: usize,
     },
-    /// Print one table of one or more reports of the same dataset and frames
+    /// Print one table of what was evaluated: reports of the same dataset and frames, or driven
+    /// episodes of the same suite
     #[command(after_help = AFTER)]
-    Table {
-        /// Directories that `pmp-eval offline` wrote
-        #[arg(value_name = "DIR", required = true)]
-        reports: Vec<PathBuf>,
-        /// What to print
-        #[arg(long, value_name = "FORMAT", default_value = "md")]
-        format: Format,
-    },
+    Table(Table),
+}
+
+#[derive(clap::Args)]
+struct Table {
+    /// Directories that `pmp-eval offline` wrote, or that `pmp-eval drive` wrote
+    #[arg(value_name = "DIR", required_unless_present = "reference")]
+    directories: Vec<PathBuf>,
+    /// What to print
+    #[arg(long, value_name = "FORMAT", default_value = "md")]
+    format: Format,
+    /// Of driven episodes: set the paper's own numbers beside them; without DIR, print them alone
+    #[arg(long, value_name = "WHOSE")]
+    reference: Option<Reference>,
+    /// Of driven episodes: policies that are one model trained from several seeds; repeatable
+    #[arg(long = "group", value_name = "NAME=P1,P2,...", value_parser = group)]
+    groups: Vec<Group>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Reference {
+    Paper,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -80,6 +98,7 @@ Examples:
   pmp-eval offline --policy runs/tiny --data data/town --out reports/tiny
   pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
   pmp-eval table reports/tiny reports/ab --format csv > table.csv
+  pmp-eval table driven/ --reference paper
 
 Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
 
@@ -117,7 +136,7 @@ fn holdout(dataset: &open::Dataset) -> Result<Holdout> {
     })
 }
 
-fn offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<Outcome> {
+fn evaluate_offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<Outcome> {
     store::refuse_existing(out)?;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs).build_global();
     threads.map_err(|error| Error::Config {
@@ -135,17 +154,77 @@ fn offline(policies: &[String], data: &Path, out: &Path, jobs: usize) -> Result<
     let frames = dataset.frames(&dataset.val).inspect(|_| bar.inc(1));
     let errors = evaluate(&mut policies, frames)?;
     bar.finish_and_clear();
-    let report = summary::summarise(Dataset::of(data)?, holdout, &errors, Bootstrap::default());
+    let report =
+        offline::summary::summarise(Dataset::of(data)?, holdout, &errors, Bootstrap::default());
     store::write(out, &report, &errors)?;
     cli::print(&render::markdown(&report))?;
     let all = report.evaluated.frames == report.holdout.frames;
     Ok(if all { Outcome::Done } else { Outcome::DoneWithLoss })
 }
 
-fn table(directories: Vec<PathBuf>, format: Format) -> Result<Outcome> {
-    let read = |directory: PathBuf| store::read(&directory).map(|report| (directory, report));
-    let report = Report::merge(directories.into_iter().map(read).collect::<Result<_>>()?)?;
-    cli::print(&match format {
+/// `NAME=P1,P2,...`
+fn group(text: &str) -> Result<Group, String> {
+    let (name, policies) = text.split_once('=').ok_or("no `=` in it")?;
+    let policies = policies.split(',').map(str::to_string).collect();
+    Ok(Group { name: name.to_string(), policies })
+}
+
+/// What directories hold.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Offline,
+    Driven,
+}
+
+/// What all of the directories hold.
+fn kind(directories: &[PathBuf]) -> Result<Kind> {
+    let refuse = |path: &Path, what: &str, hint: &str| {
+        Err(Error::Report { path: path.into(), what: what.into(), hint: Some(hint.into()) })
+    };
+    let mut found = None;
+    for directory in directories {
+        let holds = |name: &str| directory.join(name).is_file();
+        let kind = match (holds("report.json"), holds(results::FILE)) {
+            (true, false) => Kind::Offline,
+            (false, true) => Kind::Driven,
+            (true, true) => {
+                let hint = "move one of them to a directory of its own";
+                return refuse(directory, "both report.json and episodes.parquet are here", hint);
+            }
+            (false, false) => {
+                let hint = "`pmp-eval offline --policy P --data DATASET --out DIR` makes a \
+                            report, `pmp-eval drive` drives episodes";
+                let what = "no report can be read: neither report.json nor episodes.parquet";
+                return refuse(directory, what, hint);
+            }
+        };
+        if found.is_some_and(|other| other != kind) {
+            let hint = "one table holds one kind: make one table for each";
+            return refuse(directory, "an offline report and driven episodes", hint);
+        }
+        found = Some(kind);
+    }
+    Ok(found.unwrap_or(Kind::Driven))
+}
+
+fn table(args: &Table) -> Result<Outcome> {
+    match kind(&args.directories)? {
+        Kind::Driven => driven_table(args),
+        Kind::Offline if args.reference.is_some() || !args.groups.is_empty() => {
+            Err(Error::Config {
+                key: "--reference, --group".to_string(),
+                what: "not for offline reports".to_string(),
+                hint: Some("they are for directories that `pmp-eval drive` wrote".to_string()),
+            })
+        }
+        Kind::Offline => offline_table(args),
+    }
+}
+
+fn offline_table(args: &Table) -> Result<Outcome> {
+    let read = |directory: &PathBuf| Ok((directory.clone(), store::read(directory)?));
+    let report = Report::merge(args.directories.iter().map(read).collect::<Result<_>>()?)?;
+    cli::print(&match args.format {
         Format::Md => render::markdown(&report),
         Format::Csv => render::csv(&report),
         Format::Tex => render::latex(&report),
@@ -154,9 +233,29 @@ fn table(directories: Vec<PathBuf>, format: Format) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+fn driven_table(args: &Table) -> Result<Outcome> {
+    let paper = args.reference.map(|Reference::Paper| Paper::table()).transpose()?;
+    let table = match (&paper, args.directories.is_empty()) {
+        (Some(paper), true) => summary::of_paper(paper),
+        _ => {
+            let rows = table::read(&args.directories)?;
+            summary::of_episodes(&rows, &args.groups, Bootstrap::default(), paper.as_ref())?
+        }
+    };
+    cli::print(&match args.format {
+        Format::Md => markdown::markdown(&table),
+        Format::Csv => csv::csv(&table),
+        Format::Tex => latex::latex(&table),
+        Format::Json => table::json(&table)?,
+    })?;
+    Ok(Outcome::Done)
+}
+
 fn main() -> ExitCode {
     cli::main(|| match Args::parse().command {
-        Command::Offline { policies, data, out, jobs } => offline(&policies, &data, &out, jobs),
-        Command::Table { reports, format } => table(reports, format),
+        Command::Offline { policies, data, out, jobs } => {
+            evaluate_offline(&policies, &data, &out, jobs)
+        }
+        Command::Table(args) => table(&args),
     })
 }

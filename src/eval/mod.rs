@@ -6,5 +6,6 @@
 
 pub mod statistics;
 pub mod baseline;
+pub mod quoting;
 pub mod offline;
 pub mod table;

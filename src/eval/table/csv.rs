@@ -1,6 +1,9 @@
 //! A table as CSV, tidy: one line for each system, task and metric.
 
-use crate::eval::table::report::{Cell, Definition, Source, System, Table};
+use crate::eval::{
+    quoting,
+    table::report::{Cell, Definition, Source, System, Table},
+};
 
 /// What stands for every condition, town or traffic.
 const ALL: &str = "all";
@@ -30,9 +33,9 @@ fn lines(text: &mut String, table: &Table, system: &System, place: [&str; 3], ce
         Source::Driven => "driven",
         Source::Paper => "paper",
     };
-    let mut head = vec![quoted(table.suite.as_deref().unwrap_or_default())];
-    head.extend([quoted(&system.name), source.to_string()]);
-    head.extend(place.map(quoted));
+    let mut head = vec![quoting::csv(table.suite.as_deref().unwrap_or_default())];
+    head.extend([quoting::csv(&system.name), source.to_string()]);
+    head.extend(place.map(quoting::csv));
     let exact = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
     for Definition { key, unit, .. } in &table.metrics {
         let Some(estimate) = cell.metrics.get(key) else { continue };
@@ -50,13 +53,5 @@ fn lines(text: &mut String, table: &Table, system: &System, place: [&str; 3], ce
             cell.lacking.to_string(),
         ]);
         *text += &(line.join(",") + "\n");
-    }
-}
-
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_string()
     }
 }

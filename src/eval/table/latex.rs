@@ -2,9 +2,12 @@
 
 use std::fmt::Write as _;
 
-use crate::eval::table::{
-    cells::{MISSING, Pieces, heads, letter, pieces, table_i, title},
-    report::{Source, Table},
+use crate::eval::{
+    quoting,
+    table::{
+        cells::{MISSING, Pieces, heads, letter, pieces, table_i, title},
+        report::{Source, Table},
+    },
 };
 
 /// A `tabular` of `booktabs`: systems by metric, tasks by condition and town, all tasks last with
@@ -21,22 +24,23 @@ pub fn latex(table: &Table) -> String {
     for pick in [0, 1] {
         let names = heads.iter().map(|head| {
             let name = if pick == 0 { &head[0].condition } else { &head[0].town };
-            format!(" & \\multicolumn{{{}}}{{c}}{{{}}}", head.len(), escaped(name))
+            format!(" & \\multicolumn{{{}}}{{c}}{{{}}}", head.len(), quoting::latex(name))
         });
         let _ = writeln!(text, " & {} & \\\\", names.collect::<String>());
     }
-    let letters = table.tasks.iter().map(|task| format!(" & {}", escaped(letter(&task.traffic))));
+    let letters =
+        table.tasks.iter().map(|task| format!(" & {}", quoting::latex(letter(&task.traffic))));
     let _ = writeln!(text, " & {} & all \\\\", letters.collect::<String>());
     for metric in table_i(table) {
         text += "\\midrule\n";
         for (i, system) in table.systems.iter().enumerate() {
             let head = match i {
-                0 => format!("{} (\\%)", escaped(title(table, metric))),
+                0 => format!("{} (\\%)", quoting::latex(title(table, metric))),
                 _ => String::new(),
             };
             let name = match system.source {
-                Source::Driven => escaped(&system.name),
-                Source::Paper => format!("{} (paper)", escaped(&system.name)),
+                Source::Driven => quoting::latex(&system.name),
+                Source::Paper => format!("{} (paper)", quoting::latex(&system.name)),
             };
             let _ = write!(text, "{head} & {name}");
             for cell in &system.tasks {
@@ -57,18 +61,4 @@ fn cell_text(pieces: Option<Pieces>) -> String {
     let fraction = fraction.map_or(String::new(), small);
     let interval = interval.map_or(String::new(), |interval| small(format!("$[{interval}]$")));
     format!("${value}${fraction}{interval}")
-}
-
-fn escaped(text: &str) -> String {
-    let mut escaped = String::new();
-    for c in text.chars() {
-        match c {
-            '\\' => escaped += "\\textbackslash{}",
-            '~' => escaped += "\\textasciitilde{}",
-            '^' => escaped += "\\textasciicircum{}",
-            '&' | '%' | '$' | '#' | '_' | '{' | '}' => escaped.extend(['\\', c]),
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }
