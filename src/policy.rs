@@ -46,6 +46,9 @@ pub struct Plan {
     pub action: Option<Action>,
     /// The planned motion: modes of a mixture, weights summing to 1; empty if none is planned.
     pub motion: Vec<Mode>,
+    /// Names of the branches that a policy looks through, and the share that each has in what it
+    /// does, summing to 1; empty of a policy that has none (`a` of the paper's eq. (2)).
+    pub attention: Vec<(&'static str, f32)>,
 }
 
 impl Plan {

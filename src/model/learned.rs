@@ -77,7 +77,10 @@ impl Policy for Learned {
         let action = output.action.flatten_all()?.to_vec1::<f32>()?;
         let action = Action { steer: action[0], throttle: action[1], brake: action[2] };
         let motion = output.motion.as_ref().map(modes).transpose()?.unwrap_or_default();
-        Ok(Plan { action: Some(action), motion })
+        let shares = output.attention.map(|shares| shares.flatten_all()?.to_vec1::<f32>());
+        let shares = shares.transpose()?.unwrap_or_default();
+        let attention = self.net.branches().into_iter().zip(shares).collect();
+        Ok(Plan { action: Some(action), motion, attention })
     }
 }
 
