@@ -61,7 +61,10 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod sampling;
+mod statistics;
 mod tables;
+#[cfg(feature = "learning")]
+mod tables_cli;
 mod world;
 mod encoding;
 #[cfg(feature = "learning")]

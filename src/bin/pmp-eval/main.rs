@@ -31,6 +31,7 @@ Examples:
   pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
   pmp-eval drive --policy runs/tiny expert --suite deeptest --quick --out drives/quick
   pmp-eval table reports/tiny reports/ab --format csv > table.csv
+  pmp-eval table driven/ --reference paper
 
 Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
 
