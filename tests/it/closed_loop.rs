@@ -99,11 +99,8 @@ fn a_policy_is_shown_the_frames_that_ingest_makes_of_a_log_of_its_drive() {
     let setting =
         Setting { suite: &suite, stage: &shared.stage, shapes: &shared.shapes, rig: &rig };
     let shown = Arc::new(Mutex::new(Vec::new()));
-    let mut pilot = PolicyPilot::new(
-        Box::new(Witness(shown.clone())),
-        ControlConfig::default(),
-        Fusion::A1,
-    );
+    let mut pilot =
+        PolicyPilot::new(Box::new(Witness(shown.clone())), ControlConfig::default(), Fusion::A1);
     let log = folder.path().join("witness.mcap");
     let outing =
         outing::drive(&setting, &suite.episodes[0], "witness", &mut pilot, Some(&log)).unwrap();
@@ -144,7 +141,7 @@ fn a_policy_is_shown_the_frames_that_ingest_makes_of_a_log_of_its_drive() {
 /// A straight way of 40 m along one lane of the town, and where a car on it would be.
 fn straight() -> (Arc<Route>, LanePlace) {
     let planner = Planner::new(&TOWN.map, LANE_CHANGE_M);
-    let lanes = 0..TOWN.map.lanes().len();
+    let lanes = 0..TOWN.map.graph().lanes().len();
     let route = lanes.into_iter().find_map(|lane| {
         let (from, to) = (LanePlace { lane, s_m: 20.0 }, LanePlace { lane, s_m: 60.0 });
         let route = MapRoute::through(&planner, &[from, to]).ok()?;
@@ -405,12 +402,15 @@ fn a_contest_gives_the_same_rows_for_any_number_of_jobs_and_goes_on_where_it_was
     assert_eq!((resumed == bytes, count), (true, 2));
 
     let reasons: Vec<_> = rows.iter().map(|row| (&*row.policy, &*row.reason)).collect();
-    assert_eq!(&reasons[..4], [
-        ("expert", "timeout"),
-        ("expert", "timeout"),
-        ("oracle", "timeout"),
-        ("oracle", "timeout")
-    ]);
+    assert_eq!(
+        &reasons[..4],
+        [
+            ("expert", "timeout"),
+            ("expert", "timeout"),
+            ("oracle", "timeout"),
+            ("oracle", "timeout")
+        ]
+    );
     assert!(rows[..4].iter().all(|row| row.driven_m > 5.0), "{rows:?}");
     for row in &rows[4..] {
         assert_eq!((&*row.reason, row.success), ("crashed", false));
@@ -499,7 +499,8 @@ fn deeptest_is_what_the_paper_says_of_it() {
         }
     }
     let routes_of = |traffic| {
-        let of_task = full.episodes.iter().filter(move |e| e.town == "Town07" && e.traffic == traffic);
+        let of_task =
+            full.episodes.iter().filter(move |e| e.town == "Town07" && e.traffic == traffic);
         of_task.map(|e| e.number).collect::<Vec<_>>()
     };
     assert_eq!(routes_of(Density::Empty), routes_of(Density::Dense), "the same routes");
@@ -518,8 +519,10 @@ fn what_a_suite_cannot_say_is_an_error_that_tells_where() {
     let said = refused(&deeptest.replace("goal_m", "goal_metres"));
     assert!(said.contains("goal_metres") && said.contains("goal_m"), "{said}");
     assert!(refused(&deeptest.replace("storm-dark", "storm-black")).contains("storm-black"));
-    assert!(refused(&deeptest.replace("slowest_kmph = 10.0", "slowest_kmph = 0.0"))
-        .contains("positive"));
+    assert!(
+        refused(&deeptest.replace("slowest_kmph = 10.0", "slowest_kmph = 0.0"))
+            .contains("positive")
+    );
     assert!(refused("version = 7").contains("missing field"), "{}", refused("version = 7"));
     let unknown = Suite::open("deeptset", None, Extent::Full).unwrap_err();
     assert!(unknown.hint().unwrap().contains("deeptest"), "{unknown}");

@@ -88,4 +88,6 @@ mod maps;
 #[cfg(feature = "reports")]
 mod stats;
 #[cfg(feature = "learning")]
+mod drive_cli;
+#[cfg(feature = "learning")]
 mod whole_path;

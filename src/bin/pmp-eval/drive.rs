@@ -19,7 +19,7 @@ use pmp::{
     },
     control::{driver::ControlConfig, fusion::Fusion},
     error::{Error, Result},
-    eval::baseline,
+    eval::{baseline, table},
     model::learned::Learned,
 };
 
@@ -121,10 +121,12 @@ pub(crate) fn run(args: &Drive) -> Result<Outcome> {
     let so_far = Mutex::new((0, 0));
     let (rows, timings) = contest.drive(&|progress| told(&bar, &so_far, &progress))?;
     bar.finish_and_clear();
-    let path = args.out.join("episodes.parquet");
-    results::write(&path, &rows)?;
+    results::write(&args.out.join(results::FILE), &rows)?;
     atomic::write_json(&args.out.join("timing.json"), &timings)?;
+    table::store::write(&args.out, &rows)?;
     timings.iter().for_each(tell_timing);
+    let path = args.out.join("table.md");
+    cli::print(&fs::read_to_string(&path).map_err(Error::io("read", &path))?)?;
     let crashed = rows.iter().any(|row| row.reason == "crashed");
     Ok(if crashed { Outcome::DoneWithLoss } else { Outcome::Done })
 }
