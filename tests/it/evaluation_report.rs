@@ -5,29 +5,30 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     path::Path,
-    process::{Command, Output},
 };
 
 use parquet::{
     file::reader::{FileReader as _, SerializedFileReader},
-    record::RowAccessor as _,
+    record::{Row, RowAccessor as _},
 };
 use pmp::{
+    control::fusion::Fusion,
     error::Result,
     eval::{
         baseline::baseline,
         offline::{
-            definitions::METRICS,
-            evaluate::{Errors, evaluate},
+            definitions::{CURVES, METRICS},
+            errors::{Errors, Sight},
+            evaluate::{Contender, evaluate},
             plot, render,
-            report::{Dataset, Holdout, HoldoutKind, Report, Verdict},
+            report::{Dataset, Definition, Holdout, HoldoutKind, Report, Verdict},
             store,
             summary::summarise,
         },
         statistics::{Bootstrap, Unit},
     },
     frame::{Frame, signed_speed_mps},
-    policy::{Plan, Policy},
+    policy::{Action, Plan, Policy},
 };
 use serde_json::Value;
 
@@ -62,16 +63,16 @@ fn drives(episodes: u32, frames: u32) -> Vec<Result<(String, Frame)>> {
     (0..episodes).flat_map(|e| (0..frames).map(move |i| (e, i))).map(|(e, i)| frame(e, i)).collect()
 }
 
-fn errors(offset_mps: f32, episodes: u32, frames: u32) -> Errors {
-    let mut policies: Vec<Box<dyn Policy>> = vec![
+pub(crate) fn errors(offset_mps: f32, episodes: u32, frames: u32) -> Errors {
+    let policies: [Box<dyn Policy>; 3] = [
         Box::new(Offset(offset_mps)),
         baseline("constant-velocity").unwrap(),
         baseline("stand-still").unwrap(),
     ];
-    evaluate(&mut policies, drives(episodes, frames)).unwrap()
+    evaluate(&mut policies.map(Contender::from), drives(episodes, frames)).unwrap()
 }
 
-fn report_of(errors: &Errors, weak: bool) -> Report {
+pub(crate) fn report_of(errors: &Errors, weak: bool) -> Report {
     let dataset = Dataset { name: "town".into(), manifest_sha256: "ab".repeat(32) };
     let holdout = Holdout {
         kind: if weak { HoldoutKind::TimeBlock } else { HoldoutKind::Episodes },
@@ -89,7 +90,7 @@ fn report(offset_mps: f32, episodes: u32, frames: u32) -> Report {
 }
 
 fn verdict(report: &Report) -> (Verdict, &str) {
-    let paired = report.policies[0].paired.as_ref().unwrap();
+    let paired = &report.policies[0].paired[0];
     (paired.verdict, &paired.sentence)
 }
 
@@ -172,11 +173,11 @@ fn frames_that_were_not_read_are_counted_in_the_first_lines() {
 
 #[test]
 fn oracle_is_marked_and_never_said_to_beat_anything() {
-    let mut policies = [baseline("recorded").unwrap(), baseline("constant-velocity").unwrap()];
+    let mut policies = ["recorded", "constant-velocity"].map(|name| baseline(name).unwrap().into());
     let errors = evaluate(&mut policies, drives(6, 60)).unwrap();
     let report = report_of(&errors, false);
-    assert_eq!(report.policies[0].paired, None);
-    assert_eq!(report.policies[1].paired, None, "nothing to compare the reference with");
+    assert_eq!(report.policies[0].paired, []);
+    assert_eq!(report.policies[1].paired, [], "nothing to compare the reference with");
     assert_eq!(
         report.caveats,
         ["`recorded` reads what the driver did next: it is a floor, not a driver."]
@@ -352,7 +353,10 @@ fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {
-                let key = if METRICS.iter().any(|m| m.key == key) { "*" } else { key };
+                let is_data = METRICS.iter().any(|metric| metric.key == key)
+                    || CURVES.iter().any(|curve| curve.key == key)
+                    || path.ends_with(".attention");
+                let key = if is_data { "*" } else { key };
                 let path = if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
                 fields(value, &path, found);
             }
@@ -366,65 +370,179 @@ fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     }
 }
 
+/// Plans everything that a plan can have.
+struct Whole;
+
+impl Policy for Whole {
+    fn name(&self) -> &str {
+        "whole"
+    }
+
+    fn reset(&mut self) {}
+
+    fn plan(&mut self, frame: &Frame) -> Result<Plan> {
+        let speed_mps = signed_speed_mps(frame.velocity_mps);
+        let std = 0.5 + 0.1 * frame.index as f32;
+        Ok(Plan {
+            action: Some(Action { steer: 0.2, throttle: 0.5, brake: 0.0 }),
+            motion: vec![
+                steady(0.75, speed_mps, 0.0, Some([std, 0.1])),
+                steady(0.25, speed_mps + 1.0, 0.1, Some([2.0, 0.1])),
+            ],
+            attention: vec![("camera", 0.25), ("route", 0.75)],
+        })
+    }
+}
+
+fn whole() -> Errors {
+    let fusion = Some(Fusion::Variance { c1: 2.0, c2: 0.001 });
+    let whole = Contender { policy: Box::new(Whole), sight: Sight::Blind, fusion };
+    let other = Contender {
+        sight: Sight::Seeing,
+        ..Contender::from(Box::new(Offset(1.0)) as Box<dyn Policy>)
+    };
+    let mut contenders = [whole, other, Contender::from(baseline("constant-velocity").unwrap())];
+    evaluate(&mut contenders, drives(6, 60)).unwrap()
+}
+
 #[test]
 fn schema_lists_every_field_metric_and_column() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.v1.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.v2.json");
     let schema: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
 
-    let report = report_of(&errors(1.0, 1, 100), true);
+    let mut report = report_of(&whole(), true);
+    assert_eq!(report.policies[1].paired.len(), 2, "against the reference, and the blind one");
+    report.policies.iter_mut().for_each(|policy| policy.slices.truncate(1));
     let mut found = BTreeSet::new();
-    // Twice: the same report once with and once without optional parts.
     fields(&serde_json::to_value(&report).unwrap(), "", &mut found);
-    found.retain(|path| {
-        !["policies[].paired", "policies[].metrics.*.interval"].contains(&path.as_str())
-    });
-    found.remove("policies[].slices[].metrics.*.interval");
+    // Empty or null in one policy, and whole in another.
+    let optional = [
+        "fusion",
+        "pit",
+        "variance",
+        "variance.lambda",
+        "metrics.*.interval",
+        "curves.*[].interval",
+        "paired[].interval",
+    ];
+    found.retain(|path| !optional.iter().any(|end| *path == format!("policies[].{end}")));
     let mut listed = BTreeSet::new();
     for field in schema["fields"].as_array().unwrap() {
         assert!(field["meaning"].is_string() && field["type"].is_string(), "{field}");
         listed.insert(field["path"].as_str().unwrap().to_string());
     }
-    listed.remove("policies[].slices[].metrics.*.interval");
     assert_eq!(found, listed);
 
-    let in_code: Vec<Value> = METRICS
-        .iter()
-        .map(|m| {
-            serde_json::json!({
-                "key": m.key, "title": m.title, "unit": m.unit, "better": m.better.text(),
-                "definition": m.definition,
-            })
-        })
-        .collect();
-    assert_eq!(schema["metrics"].as_array().unwrap(), &in_code);
+    for (name, definitions) in
+        [("metrics", Definition::metrics()), ("curves", Definition::curves())]
+    {
+        assert_eq!(schema[name], serde_json::to_value(definitions).unwrap());
+    }
 
-    let directory = tempfile::tempdir().unwrap();
-    store::write(directory.path(), &report, &errors(1.0, 1, 100)).unwrap();
     let columns: Vec<&str> = schema["errors_columns"]
         .as_array()
         .unwrap()
         .iter()
         .map(|c| c["name"].as_str().unwrap())
         .collect();
+    let mut written: Vec<String> = rows(&whole())
+        .0
+        .into_iter()
+        .map(|name| match name.starts_with("attention_") {
+            true => "attention_*".to_string(),
+            false => name,
+        })
+        .collect();
+    written.dedup();
+    assert_eq!(written, columns);
+}
+
+/// Columns and rows of `errors.parquet`.
+fn rows(errors: &Errors) -> (Vec<String>, Vec<Row>) {
+    let directory = tempfile::tempdir().unwrap();
+    store::write(directory.path(), &report_of(errors, false), errors).unwrap();
     let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
     let reader = SerializedFileReader::new(file).unwrap();
-    let written = reader.metadata().file_metadata().schema_descr().columns();
-    assert_eq!(written.iter().map(|c| c.name()).collect::<Vec<_>>(), columns);
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let names = schema.root_schema().get_fields().iter().map(|f| f.name().to_string()).collect();
+    (names, reader.get_row_iter(None).unwrap().map(std::result::Result::unwrap).collect())
+}
+
+#[test]
+fn surroundings_make_slices_where_something_is_known_of_them() {
+    let frames = drives(6, 40).into_iter().enumerate().map(|(i, item)| {
+        let (episode, mut frame) = item.unwrap();
+        frame.conditions.town = Some(format!("Town0{}", 1 + i / 120));
+        frame.conditions.weather = (i >= 200).then(|| "rainy".to_string());
+        Ok((episode, frame))
+    });
+    let mut contenders = [Contender::from(baseline("constant-velocity").unwrap())];
+    let report = report_of(&evaluate(&mut contenders, frames).unwrap(), false);
+    let slices = report.policies[0].slices.iter();
+    let rest: Vec<_> = slices
+        .filter(|slice| slice.by != "command" && slice.by != "speed")
+        .map(|slice| (slice.by.as_str(), slice.name.as_str(), slice.frames))
+        .collect();
+    assert_eq!(
+        rest,
+        [
+            ("town", "Town01", 120),
+            ("town", "Town02", 120),
+            ("weather", "rainy", 40),
+            ("weather", "unknown", 200)
+        ]
+    );
+}
+
+#[test]
+fn missing_blind_policy_is_named_with_the_command_that_trains_one() {
+    let seeing = || Contender {
+        sight: Sight::Seeing,
+        ..Contender::from(Box::new(Offset(1.0)) as Box<dyn Policy>)
+    };
+    let caveats = |contenders: &mut [Contender]| {
+        report_of(&evaluate(contenders, drives(6, 40)).unwrap(), false).caveats
+    };
+    let alone = caveats(&mut [seeing()]);
+    assert!(alone[0].contains("pmp-train --data DATASET --out RUN --model blind"), "{alone:?}");
+    let blind = Contender { policy: Box::new(Whole), sight: Sight::Blind, fusion: None };
+    assert_eq!(caveats(&mut [seeing(), blind]), [] as [String; 0]);
+}
+
+#[test]
+fn attention_and_shares_of_a2_are_means_over_frames() {
+    let report = report_of(&whole(), false);
+    let policy = &report.policies[0];
+    let expected = [("camera".to_string(), 0.25), ("route".to_string(), 0.75)];
+    assert_eq!(policy.attention, expected.clone().into());
+    let follow = policy.slices.iter().find(|slice| slice.name == "follow").unwrap();
+    assert_eq!(follow.attention, expected.into());
+    let variance = policy.variance.as_ref().unwrap();
+    let lambda = variance.lambda.as_ref().unwrap();
+    assert_eq!(lambda.frames, 6 * 60);
+    assert_eq!(lambda.counts.iter().sum::<u64>(), lambda.frames);
+    // Frames whose future reaches the target, which a faster car reaches sooner.
+    assert!(variance.frames > 6 * 30 && variance.frames < 6 * 60, "{}", variance.frames);
+    assert_eq!(variance.tenths.iter().map(|tenth| tenth.frames).sum::<u64>(), variance.frames);
+    assert_eq!(variance.grid.counts.iter().flatten().sum::<u64>(), variance.frames);
+    let others = &report.policies[1];
+    assert!(others.attention.is_empty());
+    assert_eq!(others.variance.as_ref().unwrap().lambda, None, "its constants are not known");
+    let pit = policy.pit.as_ref().unwrap();
+    // Six drives, 30 frames each with a whole future, ten steps in each second.
+    for counts in pit.speed.iter().chain(&pit.yaw) {
+        assert_eq!(counts.iter().sum::<u64>(), 6 * 30 * 10);
+    }
 }
 
 #[test]
 fn table_can_be_made_again_from_the_errors_per_frame() {
     let errors = errors(1.0, 6, 40);
     let report = report_of(&errors, false);
-    let directory = tempfile::tempdir().unwrap();
-    store::write(directory.path(), &report, &errors).unwrap();
-    let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
-    let at = columns.iter().position(|column| column.name() == "speed_mae_3s").unwrap();
+    let (names, rows) = rows(&errors);
+    let at = names.iter().position(|name| name == "speed_mae_3s").unwrap();
     let mut sums: BTreeMap<String, (f64, f64, u64)> = BTreeMap::new();
-    for row in reader.get_row_iter(None).unwrap() {
-        let row = row.unwrap();
+    for row in rows {
         let (sum, squares, count) = sums.entry(row.get_string(0).unwrap().clone()).or_default();
         if let Ok(error) = row.get_double(at) {
             *sum += error;
@@ -464,91 +582,10 @@ fn existing_report_is_kept_and_no_temporary_file_is_left() {
     assert_same(&store::read(directory.path()).unwrap(), &report);
 }
 
-fn pmp_eval(arguments: &[&str], directory: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pmp-eval"));
-    command.args(arguments).current_dir(directory).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-#[test]
-fn table_merges_reports_of_the_same_frames_and_prints_to_stdout() {
-    let directory = tempfile::tempdir().unwrap();
-    let write = |name: &str, errors: &Errors| {
-        store::write(&directory.path().join(name), &report_of(errors, false), errors).unwrap();
-    };
-    write("a", &errors(1.0, 6, 40));
-    let mut renamed = errors(0.5, 6, 40);
-    renamed.policies[0].name = "run_2".to_string();
-    write("b", &renamed);
-    let output = pmp_eval(&["table", "a", "b", "--format", "csv"], directory.path());
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let csv = String::from_utf8(output.stdout).unwrap();
-    let names: Vec<_> = csv.lines().skip(1).map(|row| row.split(',').nth(3).unwrap()).collect();
-    assert_eq!(names, ["run_1", "constant-velocity", "stand-still", "run_2"]);
-    for (format, start) in [("md", "# Offline"), ("tex", "\\begin{tabular}"), ("json", "{\n")] {
-        let output = pmp_eval(&["table", "a", "--format", format], directory.path());
-        assert!(String::from_utf8(output.stdout).unwrap().starts_with(start), "{format}");
-    }
-}
-
-#[test]
-fn table_refuses_what_does_not_belong_together_and_says_which() {
-    let directory = tempfile::tempdir().unwrap();
-    let write = |name: &str, report: &Report, errors: &Errors| {
-        store::write(&directory.path().join(name), report, errors).unwrap();
-    };
-    let of = errors(1.0, 6, 40);
-    write("a", &report_of(&of, false), &of);
-    let fewer = errors(1.0, 6, 39);
-    write("frames", &report_of(&fewer, false), &fewer);
-    let mut elsewhere = report_of(&of, false);
-    elsewhere.dataset.manifest_sha256 = "cd".repeat(32);
-    write("dataset", &elsewhere, &of);
-    let retrained = errors(2.0, 6, 40);
-    write("name", &report_of(&retrained, false), &retrained);
-    for (other, what) in [
-        ("frames", "is over other frames (234 held out by episodes) than a (240 by episodes)"),
-        ("dataset", "of dataset town (cdcdcdcdcdcd) and a is of dataset town (abababababab)"),
-        ("name", "another `run_1` than in a"),
-        ("absent", "no report can be read"),
-    ] {
-        let output = pmp_eval(&["table", "a", other], directory.path());
-        assert_eq!(output.status.code(), Some(1), "{other}");
-        assert!(output.stdout.is_empty(), "{other}");
-        assert!(stderr(&output).contains(what), "{}", stderr(&output));
-        assert!(stderr(&output).contains("hint: "), "{}", stderr(&output));
-    }
-}
-
 #[test]
 fn report_of_another_version_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("report.json"), r#"{"version": 9}"#).unwrap();
     let error = store::read(directory.path()).unwrap_err().to_string();
-    assert!(error.contains("version 9, this build reads version 1"), "{error}");
-}
-
-#[test]
-fn misuse_exits_2_and_help_teaches() {
-    let here = Path::new(".");
-    let output = pmp_eval(&["offline", "--policy", "stand-still", "--out", "x"], here);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("--data"), "{}", stderr(&output));
-    let help = String::from_utf8(pmp_eval(&["offline", "--help"], here).stdout).unwrap();
-    for word in ["Examples:", "Exit codes:", "constant-velocity", "report.json"] {
-        assert!(help.contains(word), "{help}");
-    }
-}
-
-#[test]
-fn unknown_policy_fails_with_the_names_that_exist() {
-    let directory = tempfile::tempdir().unwrap();
-    let arguments = ["offline", "--policy", "constant-speed", "--data", "d", "--out", "o"];
-    let output = pmp_eval(&arguments, directory.path());
-    assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("constant-velocity"), "{}", stderr(&output));
-    assert!(!directory.path().join("o").exists(), "nothing was written");
+    assert!(error.contains("version 9, this build reads version 2"), "{error}");
 }

@@ -42,8 +42,10 @@ mod conventions;
 mod readers;
 mod real_drive;
 mod evaluation;
-#[cfg(feature = "learning")]
+mod statistics;
 mod evaluation_report;
+#[cfg(feature = "learning")]
+mod evaluation_cli;
 #[cfg(feature = "learning")]
 mod samples;
 #[cfg(feature = "learning")]

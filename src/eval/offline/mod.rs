@@ -6,14 +6,25 @@
 //!                             store: errors.parquet          store: report.json
 //! ```
 //!
-//! [`metrics`] are pure functions of one frame and one plan; [`definitions`] is the one table that
-//! says what each number is.
+//! [`metrics`] and what stands above it are pure functions of one frame and one plan; [`errors`] is
+//! what is kept of them; [`definitions`] is the one table that says what each number is.
 
+pub mod horizons;
+pub mod mixture_errors;
+pub mod steering;
+pub mod pedals;
 pub mod metrics;
-pub mod definitions;
+pub mod errors;
 pub mod evaluate;
+pub mod measures;
+pub mod definitions;
 pub mod report;
+pub mod estimate;
+pub mod slices;
+pub mod trust;
+pub mod verdict;
 pub mod summary;
 pub mod render;
 pub mod plot;
+pub mod errors_parquet;
 pub mod store;

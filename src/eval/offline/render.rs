@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use crate::eval::offline::{
     definitions::HEADLINE,
-    report::{Estimate, PolicyReport, Report},
+    report::{Definition, Estimate, PolicyReport, Report},
 };
 
 /// What a missing value looks like to people.
@@ -22,15 +22,21 @@ pub fn markdown(report: &Report) -> String {
         format!("# Offline evaluation on {}\n", report.dataset.name),
         lines(&report.caveats, |caveat| format!("> **{caveat}**\n\n")),
         basis(report),
-        metrics_table(report),
         lines(&verdicts(report), |verdict| format!("- {verdict}\n")),
+        metrics_tables(report),
         slices_table(report),
         "What the numbers are (open loop: a small error here does not show that a policy \
          drives; closed loop does):\n"
             .to_string(),
         lines(&report.metrics, |m| {
             let unit = if m.unit == "1" { String::new() } else { format!(", {}", m.unit) };
-            format!("- {} (`{}`{unit}, {} is better): {}\n", m.title, m.key, m.better, m.definition)
+            format!(
+                "- {} (`{}`{unit}, {} is better): {}\n",
+                capitalised(&m.title),
+                m.key,
+                m.better,
+                m.definition
+            )
         }),
     ];
     blocks.retain(|block| !block.is_empty());
@@ -77,7 +83,7 @@ pub fn latex(report: &Report) -> String {
     let names = lines(&report.policies, |policy| format!(" & {}", escaped(&policy.name)));
     let _ = writeln!(text, "\\begin{{tabular}}{{ll{columns}}}\n\\toprule");
     let _ = writeln!(text, "Metric & Unit & Frames{names} \\\\\n\\midrule");
-    for metric in &report.metrics {
+    for metric in metrics_had(report) {
         let cells = lines(&report.policies, |policy| {
             let estimate = of(policy, &metric.key);
             let interval = estimate.interval.map_or(String::new(), |[low, high]| {
@@ -87,7 +93,7 @@ pub fn latex(report: &Report) -> String {
             format!(" & {value}{interval}")
         });
         let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
-        let (title, frames) = (escaped(&metric.title), counts(report, &metric.key));
+        let (title, frames) = (escaped(&capitalised(&metric.title)), counts(report, &metric.key));
         let _ = writeln!(text, "{title} & {unit} & {frames}{cells} \\\\");
     }
     text + "\\bottomrule\n\\end{tabular}\n"
@@ -113,25 +119,30 @@ fn basis(report: &Report) -> String {
     )
 }
 
-fn metrics_table(report: &Report) -> String {
+/// A table for each group of metrics, of those that some policy has.
+fn metrics_tables(report: &Report) -> String {
     let names = lines(&report.policies, |policy| format!(" `{}` |", policy.name));
-    let mut text = format!("| metric | unit | better | frames |{names}\n|---|---|---|---:|");
-    text += &"---:|".repeat(report.policies.len());
-    text.push('\n');
-    for metric in &report.metrics {
-        let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
-        let frames = counts(report, &metric.key);
-        let cells =
-            lines(&report.policies, |policy| format!(" {} |", cell(of(policy, &metric.key))));
-        let _ =
-            writeln!(text, "| {} | {unit} | {} | {frames} |{cells}", metric.title, metric.better);
+    let head = format!("| metric | unit | better | frames |{names}\n|---|---|---|---:|");
+    let head = head + &"---:|".repeat(report.policies.len());
+    let mut text = String::new();
+    for group in metrics_had(report).chunk_by(|a, b| a.group == b.group) {
+        let _ = writeln!(text, "## {}\n\n{head}", capitalised(&group[0].group));
+        for metric in group {
+            let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
+            let frames = counts(report, &metric.key);
+            let cells =
+                lines(&report.policies, |policy| format!(" {} |", cell(of(policy, &metric.key))));
+            let title = capitalised(&metric.title);
+            let _ = writeln!(text, "| {title} | {unit} | {} | {frames} |{cells}", metric.better);
+        }
+        text.push('\n');
     }
     text
 }
 
 /// What can be said of the policies against the reference.
 fn verdicts(report: &Report) -> Vec<&str> {
-    let paired = report.policies.iter().filter_map(|policy| policy.paired.as_ref());
+    let paired = report.policies.iter().flat_map(|policy| &policy.paired);
     paired.map(|paired| paired.sentence.as_str()).collect()
 }
 
@@ -187,6 +198,20 @@ fn cell(estimate: &Estimate) -> String {
     let interval =
         estimate.interval.map_or(String::new(), |[low, high]| format!(" [{low:.3}, {high:.3}]"));
     value + &interval
+}
+
+/// The metrics that some policy has.
+pub fn metrics_had(report: &Report) -> Vec<&Definition> {
+    let has = |metric: &&Definition| {
+        report.policies.iter().any(|policy| of(policy, &metric.key).value.is_some())
+    };
+    report.metrics.iter().filter(has).collect()
+}
+
+/// The first letter large.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn lines<T>(items: &[T], line: impl Fn(&T) -> String) -> String {

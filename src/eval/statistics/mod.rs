@@ -1,5 +1,7 @@
 //! How far a number can be trusted, and whether two go together.
 
+pub mod mixture;
+pub mod rank;
 pub mod bootstrap;
 
 pub use bootstrap::{Bootstrap, FEWEST_UNITS, Unit, mean, units_with_a_value};
