@@ -43,7 +43,9 @@ mod readers;
 mod real_drive;
 mod evaluation;
 mod statistics;
+mod calibration;
 mod evaluation_report;
+mod chart;
 #[cfg(feature = "learning")]
 mod evaluation_cli;
 #[cfg(feature = "learning")]

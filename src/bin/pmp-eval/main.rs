@@ -2,6 +2,7 @@
 
 mod policies;
 mod offline;
+mod calibrate;
 mod table;
 
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ struct Args {
 #[derive(Subcommand)]
 enum Command {
     Offline(offline::Offline),
+    Calibrate(calibrate::Calibrate),
     Table(table::Table),
 }
 
@@ -27,6 +29,7 @@ const AFTER: &str = "\
 Examples:
   pmp-eval offline --policy runs/tiny --data data/town --out reports/tiny
   pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
+  pmp-eval calibrate --policy runs/tiny --data data/town
   pmp-eval table reports/tiny reports/ab --format csv > table.csv
 
 Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
@@ -34,6 +37,7 @@ Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame wa
 fn main() -> ExitCode {
     cli::main(|| match Args::parse().command {
         Command::Offline(args) => offline::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Table(args) => table::run(&args),
     })
 }

@@ -81,9 +81,9 @@ pub struct Curve {
     pub of: fn(&Row) -> [Option<f64>; HORIZONS],
 }
 
-const MOTION: &str = "motion";
-const MIXTURE: &str = "mixture";
-const VARIANCE: &str = "variance";
+const MOTION: &str = "Motion";
+const MIXTURE: &str = "Mixture";
+const VARIANCE: &str = "Variance";
 
 /// 1, 2 and 3 s among the horizons.
 const AT_1S: usize = WHOLE_SECONDS[0];
@@ -94,24 +94,24 @@ const AT_3S: usize = WHOLE_SECONDS[2];
 pub const MISS_M: f64 = 2.0;
 
 /// What is measured of an action, for each of `SOURCES`: their place there, the beginning of the
-/// keys, the heading, and what stands before the titles.
+/// keys, the heading, and what stands behind the titles.
 macro_rules! action_metrics {
     ($source:literal, $key:literal, $group:literal, $title:literal) => { [
-        Metric { key: concat!($key, "steer_l1"), title: concat!($title, "steer L1"), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(r.steering($source)?.l1())), definition: "mean |planned - recorded| steering in [-1, 1], over frames whose log has steering" },
-        Metric { key: concat!($key, "throttle_l1"), title: concat!($title, "throttle L1"), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from((r.errors.planned[$source]?.throttle - r.frame.recorded.throttle?).abs()))), definition: "mean |planned - recorded| throttle in [0, 1], over frames whose log has throttle" },
-        Metric { key: concat!($key, "brake_l1"), title: concat!($title, "brake L1"), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from((r.errors.planned[$source]?.brake - r.frame.recorded.brake?).abs()))), definition: "mean |planned - recorded| brake in [0, 1], over frames whose log has brake" },
-        Metric { key: concat!($key, "steer_speed_weighted"), title: concat!($title, "steer, speed-weighted"), group: $group, unit: "m/s", better: Lower, measure: Mean(|r| Some(r.steering($source)?.speed_weighted_mps())), definition: "mean |planned - recorded| steering x |speed| (Codevilla et al., 2018)" },
-        Metric { key: concat!($key, "steer_cumulative"), title: concat!($title, "steer, cumulative"), group: $group, unit: "m", better: Lower, measure: Mean(|r| r.errors.steer_way_m[$source]), definition: "mean |sum of (planned - recorded) steering x |speed| x 0.1 s| over windows of 16 frames, 1.6 s, one ending at every frame (Codevilla et al., 2018)" },
-        Metric { key: concat!($key, "steer_class_error"), title: concat!($title, "steer, other class"), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from(u8::from(r.steering($source)?.is_other_class())))), definition: "share of frames where left, straight on and right are mistaken; straight on is within 0.03 (Codevilla et al., 2018)" },
-        Metric { key: concat!($key, "steer_relative_error"), title: concat!($title, "steer, off by a tenth"), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from(u8::from(r.steering($source)?.is_beyond_tolerance())))), definition: "share of frames where |planned - recorded| steering is above 0.1 x |recorded| (Codevilla et al., 2018)" },
-        Metric { key: concat!($key, "brake_precision"), title: concat!($title, "brake precision"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.precision())), definition: "of the frames where it brakes (brake above 0.1), the share where the driver brakes" },
-        Metric { key: concat!($key, "brake_recall"), title: concat!($title, "brake recall"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.recall())), definition: "of the frames where the driver brakes (brake above 0.1), the share where it brakes" },
-        Metric { key: concat!($key, "brake_f1"), title: concat!($title, "brake F1"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.f1())), definition: "harmonic mean of brake precision and recall" },
-        Metric { key: concat!($key, "throttle_precision"), title: concat!($title, "throttle precision"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.precision())), definition: "as brake precision, of the throttle" },
-        Metric { key: concat!($key, "throttle_recall"), title: concat!($title, "throttle recall"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.recall())), definition: "as brake recall, of the throttle" },
-        Metric { key: concat!($key, "throttle_f1"), title: concat!($title, "throttle F1"), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.f1())), definition: "as brake F1, of the throttle" },
-        Metric { key: concat!($key, "brake_onset_error"), title: concat!($title, "time to brake"), group: $group, unit: "s", better: Lower, measure: Mean(|r| Some(onset_late_s(r, $source)?.abs())), definition: "mean |time between the driver's and its own beginning to brake|, over those that are within 3 s of each other; having braked for longer counts as 3 s" },
-        Metric { key: concat!($key, "brake_onset_missed"), title: concat!($title, "brakings missed"), group: $group, unit: "1", better: Lower, measure: Mean(|r| onset_is_missed(r, $source)), definition: "share of the driver's beginnings to brake without one of its own within 3 s, nor braking already" },
+        Metric { key: concat!($key, "steer_l1"), title: concat!("Steer L1", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(r.steering($source)?.l1())), definition: "mean |planned - recorded| steering in [-1, 1], over frames whose log has steering" },
+        Metric { key: concat!($key, "throttle_l1"), title: concat!("Throttle L1", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from((r.errors.planned[$source]?.throttle - r.frame.recorded.throttle?).abs()))), definition: "mean |planned - recorded| throttle in [0, 1], over frames whose log has throttle" },
+        Metric { key: concat!($key, "brake_l1"), title: concat!("Brake L1", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from((r.errors.planned[$source]?.brake - r.frame.recorded.brake?).abs()))), definition: "mean |planned - recorded| brake in [0, 1], over frames whose log has brake" },
+        Metric { key: concat!($key, "steer_speed_weighted"), title: concat!("Steer, speed-weighted", $title), group: $group, unit: "m/s", better: Lower, measure: Mean(|r| Some(r.steering($source)?.speed_weighted_mps())), definition: "mean |planned - recorded| steering x |speed| (Codevilla et al., 2018)" },
+        Metric { key: concat!($key, "steer_cumulative"), title: concat!("Steer, cumulative", $title), group: $group, unit: "m", better: Lower, measure: Mean(|r| r.errors.steer_way_m[$source]), definition: "mean |sum of (planned - recorded) steering x |speed| x 0.1 s| over windows of 16 frames, 1.6 s, one ending at every frame (Codevilla et al., 2018)" },
+        Metric { key: concat!($key, "steer_class_error"), title: concat!("Steer, other class", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from(u8::from(r.steering($source)?.is_other_class())))), definition: "share of frames where left, straight on and right are mistaken; straight on is within 0.03 (Codevilla et al., 2018)" },
+        Metric { key: concat!($key, "steer_relative_error"), title: concat!("Steer, off by a tenth", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| Some(f64::from(u8::from(r.steering($source)?.is_beyond_tolerance())))), definition: "share of frames where |planned - recorded| steering is above 0.1 x |recorded| (Codevilla et al., 2018)" },
+        Metric { key: concat!($key, "brake_precision"), title: concat!("Brake precision", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.precision())), definition: "of the frames where it brakes (brake above 0.1), the share where the driver brakes" },
+        Metric { key: concat!($key, "brake_recall"), title: concat!("Brake recall", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.recall())), definition: "of the frames where the driver brakes (brake above 0.1), the share where it brakes" },
+        Metric { key: concat!($key, "brake_f1"), title: concat!("Brake F1", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.brake($source)).map(|e| e.f1())), definition: "harmonic mean of brake precision and recall" },
+        Metric { key: concat!($key, "throttle_precision"), title: concat!("Throttle precision", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.precision())), definition: "as brake precision, of the throttle" },
+        Metric { key: concat!($key, "throttle_recall"), title: concat!("Throttle recall", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.recall())), definition: "as brake recall, of the throttle" },
+        Metric { key: concat!($key, "throttle_f1"), title: concat!("Throttle F1", $title), group: $group, unit: "1", better: Higher, measure: Ratio(|r| event(r.throttle($source)).map(|e| e.f1())), definition: "as brake F1, of the throttle" },
+        Metric { key: concat!($key, "brake_onset_error"), title: concat!("Time to brake", $title), group: $group, unit: "s", better: Lower, measure: Mean(|r| Some(onset_late_s(r, $source)?.abs())), definition: "mean |time between the driver's and its own beginning to brake|, over those that are within 3 s of each other; having braked for longer counts as 3 s" },
+        Metric { key: concat!($key, "brake_onset_missed"), title: concat!("Brakings missed", $title), group: $group, unit: "1", better: Lower, measure: Mean(|r| onset_is_missed(r, $source)), definition: "share of the driver's beginnings to brake without one of its own within 3 s, nor braking already" },
     ] };
 }
 
@@ -161,11 +161,11 @@ const VARIANCE_METRICS: [Metric; 2] = [
 ];
 
 #[rustfmt::skip]
-const A1_METRICS: [Metric; 15] = action_metrics!(0, "", "action a1 (its own)", "");
+const A1_METRICS: [Metric; 15] = action_metrics!(0, "", "Action a1: its own", "");
 #[rustfmt::skip]
-const A2_METRICS: [Metric; 15] = action_metrics!(1, "a2_", "action a2 (the controller that follows its plan)", "a2 ");
+const A2_METRICS: [Metric; 15] = action_metrics!(1, "a2_", "Action a2: of the controller that follows its plan", " (a2)");
 #[rustfmt::skip]
-const FUSED_METRICS: [Metric; 15] = action_metrics!(2, "fused_", "fused action (eq. (3), after the rules for pedals)", "fused ");
+const FUSED_METRICS: [Metric; 15] = action_metrics!(2, "fused_", "Fused action: both by eq. (3), after the rules for pedals", " (fused)");
 
 /// Every metric of an offline evaluation, in the order of reports.
 pub static METRICS: [Metric; 80] = all();

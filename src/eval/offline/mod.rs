@@ -1,7 +1,7 @@
 //! The offline evaluation: plans beside what the recorded driver did.
 //!
 //! ```text
-//! frames + policies -- evaluate --> errors per frame -- summary --> REPORT -- render --> md, csv, tex; plot --> svg
+//! frames + policies -- evaluate --> errors per frame -- summary --> REPORT -- render, html, plot --> md, csv, tex, html, svg
 //!                                        |                            |
 //!                             store: errors.parquet          store: report.json
 //! ```
@@ -26,5 +26,6 @@ pub mod verdict;
 pub mod summary;
 pub mod render;
 pub mod plot;
+pub mod html;
 pub mod errors_parquet;
 pub mod store;

@@ -30,13 +30,7 @@ pub fn markdown(report: &Report) -> String {
             .to_string(),
         lines(&report.metrics, |m| {
             let unit = if m.unit == "1" { String::new() } else { format!(", {}", m.unit) };
-            format!(
-                "- {} (`{}`{unit}, {} is better): {}\n",
-                capitalised(&m.title),
-                m.key,
-                m.better,
-                m.definition
-            )
+            format!("- {} (`{}`{unit}, {} is better): {}\n", m.title, m.key, m.better, m.definition)
         }),
     ];
     blocks.retain(|block| !block.is_empty());
@@ -93,14 +87,14 @@ pub fn latex(report: &Report) -> String {
             format!(" & {value}{interval}")
         });
         let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
-        let (title, frames) = (escaped(&capitalised(&metric.title)), counts(report, &metric.key));
+        let (title, frames) = (escaped(&metric.title), counts(report, &metric.key));
         let _ = writeln!(text, "{title} & {unit} & {frames}{cells} \\\\");
     }
     text + "\\bottomrule\n\\end{tabular}\n"
 }
 
 /// What was evaluated and how intervals were made, in sentences.
-fn basis(report: &Report) -> String {
+pub fn basis(report: &Report) -> String {
     let (evaluated, holdout, intervals) = (&report.evaluated, &report.holdout, &report.intervals);
     let bootstrap = &intervals.bootstrap;
     format!(
@@ -126,13 +120,13 @@ fn metrics_tables(report: &Report) -> String {
     let head = head + &"---:|".repeat(report.policies.len());
     let mut text = String::new();
     for group in metrics_had(report).chunk_by(|a, b| a.group == b.group) {
-        let _ = writeln!(text, "## {}\n\n{head}", capitalised(&group[0].group));
+        let _ = writeln!(text, "## {}\n\n{head}", group[0].group);
         for metric in group {
             let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
             let frames = counts(report, &metric.key);
             let cells =
                 lines(&report.policies, |policy| format!(" {} |", cell(of(policy, &metric.key))));
-            let title = capitalised(&metric.title);
+            let title = &metric.title;
             let _ = writeln!(text, "| {title} | {unit} | {} | {frames} |{cells}", metric.better);
         }
         text.push('\n');
@@ -188,7 +182,8 @@ fn counts(report: &Report, key: &str) -> String {
     counts.join(", ")
 }
 
-fn of<'a>(policy: &'a PolicyReport, key: &str) -> &'a Estimate {
+/// The number of a policy; an empty one if it has none.
+pub fn of<'a>(policy: &'a PolicyReport, key: &str) -> &'a Estimate {
     const NONE: &Estimate = &Estimate { value: None, interval: None, frames: 0 };
     policy.metrics.get(key).unwrap_or(NONE)
 }
@@ -206,12 +201,6 @@ pub fn metrics_had(report: &Report) -> Vec<&Definition> {
         report.policies.iter().any(|policy| of(policy, &metric.key).value.is_some())
     };
     report.metrics.iter().filter(has).collect()
-}
-
-/// The first letter large.
-pub fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn lines<T>(items: &[T], line: impl Fn(&T) -> String) -> String {

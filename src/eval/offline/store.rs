@@ -1,5 +1,5 @@
-//! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `errors.parquet`, and
-//! `report.json` last, whose presence means that the directory is whole.
+//! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `report.html`,
+//! `errors.parquet`, and `report.json` last, whose presence means that the directory is whole.
 
 use std::{fs, path::Path};
 
@@ -8,7 +8,9 @@ use crate::{
     error::{Error, Result},
     eval::offline::{
         errors::Errors,
-        errors_parquet, plot, render,
+        errors_parquet,
+        html::page::page,
+        plot, render,
         report::{Dataset, Report, VERSION},
     },
 };
@@ -62,6 +64,7 @@ pub fn write(directory: &Path, report: &Report, errors: &Errors) -> Result<()> {
         ("table.csv", render::csv(report)),
         ("table.tex", render::latex(report)),
         ("speed.svg", plot::speed_errors(report)),
+        ("report.html", page(report)),
         ("report.json", json(report)?),
     ];
     for (name, text) in texts {
