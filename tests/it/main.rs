@@ -73,6 +73,8 @@ mod recording;
 mod one_pixel;
 #[cfg(feature = "learning")]
 mod operations;
+#[cfg(feature = "learning")]
+mod composed;
 mod replay;
 mod ranging;
 mod camera;
