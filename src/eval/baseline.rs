@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     frame::{FUTURE_STEPS, Frame, signed_speed_mps},
-    policy::{Action, Mode, Plan, Policy},
+    policy::{Action, Mode, Plan, Policy, Senses},
 };
 
 /// Names that [`baseline`] knows.
@@ -33,10 +33,14 @@ impl Policy for ConstantVelocity {
 
     fn reset(&mut self) {}
 
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let speed_mps = signed_speed_mps(frame.velocity_mps);
         let motion = vec![certain([speed_mps; FUTURE_STEPS], [0.0; FUTURE_STEPS])];
-        Ok(Plan { action: None, motion })
+        Ok(Plan { motion, ..Plan::default() })
     }
 }
 
@@ -52,10 +56,14 @@ impl Policy for StandStill {
 
     fn reset(&mut self) {}
 
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
     fn plan(&mut self, _: &Frame) -> Result<Plan> {
         let action = Action { steer: 0.0, throttle: 0.0, brake: 1.0 };
         let motion = vec![certain([0.0; FUTURE_STEPS], [0.0; FUTURE_STEPS])];
-        Ok(Plan { action: Some(action), motion })
+        Ok(Plan { action: Some(action), motion, ..Plan::default() })
     }
 }
 
@@ -73,6 +81,10 @@ impl Policy for Recorded {
 
     fn reset(&mut self) {}
 
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let recorded = frame.action;
         let known = [recorded.steer, recorded.throttle, recorded.brake];
@@ -84,11 +96,11 @@ impl Policy for Recorded {
         // A plan always spans 3 s. Past the recording the last known value is held, and no
         // metric looks there; with nothing recorded there is no plan.
         let Some(last) = usize::from(frame.future.len).checked_sub(1) else {
-            return Ok(Plan { action, motion: Vec::new() });
+            return Ok(Plan { action, ..Plan::default() });
         };
         let held = |values: &[f32; FUTURE_STEPS]| std::array::from_fn(|i| values[i.min(last)]);
         let motion = vec![certain(held(&frame.future.speed_mps), held(&frame.future.yaw_rad))];
-        Ok(Plan { action, motion })
+        Ok(Plan { action, motion, ..Plan::default() })
     }
 
     fn sees_the_future(&self) -> bool {

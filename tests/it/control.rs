@@ -23,7 +23,7 @@ fn motion(speed_mps: f32, curvature_per_m: f32) -> Mode {
 }
 
 fn plan(mode: Mode) -> Plan {
-    Plan { action: None, motion: vec![mode] }
+    Plan { motion: vec![mode], ..Plan::default() }
 }
 
 fn near(a: f32, b: f64) {
@@ -100,7 +100,7 @@ fn brushed_brakes_are_none_and_the_harder_pedal_counts() {
     let mut driver = Driver::new(ControlConfig::default(), Fusion::A1, STEP_S);
     let mut act = |throttle: f32, brake: f32| {
         let action = Some(Action { steer: 0.0, throttle, brake });
-        let action = driver.decide(&Plan { action, motion: vec![] }, 5.0).action;
+        let action = driver.decide(&Plan { action, ..Plan::default() }, 5.0).action;
         (action.throttle, action.brake)
     };
     assert_eq!(act(0.3, 0.09), (0.3, 0.0));
@@ -133,7 +133,8 @@ fn fusion_trusts_the_plan_as_far_as_its_variance_is_small() {
     let mut driver = Driver::new(ControlConfig::default(), fusion, STEP_S);
     let mut mode = motion(8.0, 0.0);
     mode.std = Some(std);
-    let decision = driver.decide(&Plan { action: Some(a1), motion: vec![mode] }, 8.0);
+    let decision =
+        driver.decide(&Plan { action: Some(a1), motion: vec![mode], ..Plan::default() }, 8.0);
     assert!((decision.variance.unwrap() - 0.35).abs() < 1e-6);
     assert!((decision.lambda - (-0.2f64).exp()).abs() < 1e-6);
     near(decision.action.steer, 1.0 - decision.lambda);

@@ -24,7 +24,7 @@ use proptest::prelude::*;
 
 /// A frame of a car that goes straight on with a constant acceleration from `speed_mps`.
 pub(crate) fn accelerating(index: u32, speed_mps: f64, acceleration_mps2: f64) -> Frame {
-    let mut future = empty_future();
+    let mut future = Future::UNKNOWN;
     future.len = FUTURE_STEPS as u8;
     for i in 0..FUTURE_STEPS {
         let t = 0.1 * (i + 1) as f64;
@@ -84,15 +84,6 @@ pub(crate) fn steady(weight: f32, speed_mps: f32, yaw_rad: f32, std: Option<[f32
             speed_mps: [speed; FUTURE_STEPS],
             yaw_rad: [yaw; FUTURE_STEPS],
         }),
-    }
-}
-
-fn empty_future() -> Future {
-    Future {
-        speed_mps: [0.0; FUTURE_STEPS],
-        yaw_rad: [0.0; FUTURE_STEPS],
-        xy_m: [0.0; 2 * FUTURE_STEPS],
-        len: 0,
     }
 }
 
@@ -181,7 +172,8 @@ fn horizon_counts_only_frames_that_reach_it() {
     for (len, reached) in [(9, 0), (10, 1), (19, 1), (20, 2), (29, 2), (30, 3)] {
         let mut frame = accelerating(0, 5.0, 1.0);
         frame.future.len = len;
-        let plan = Plan { action: None, motion: vec![steady(1.0, 5.0, 0.0, Some([1.0, 0.1]))] };
+        let plan =
+            Plan { motion: vec![steady(1.0, 5.0, 0.0, Some([1.0, 0.1]))], ..Plan::default() };
         let errors = FrameErrors::of(&plan, &frame);
         let some = |values: [Option<f64>; 3]| values.iter().flatten().count();
         assert_eq!(some(errors.speed_mps), reached, "{len} steps");
@@ -195,7 +187,7 @@ fn horizon_counts_only_frames_that_reach_it() {
 fn heading_error_goes_the_short_way_round() {
     let mut frame = accelerating(0, 5.0, 0.0);
     frame.future.yaw_rad = [3.0; FUTURE_STEPS];
-    let plan = Plan { action: None, motion: vec![steady(1.0, 5.0, -3.0, None)] };
+    let plan = Plan { motion: vec![steady(1.0, 5.0, -3.0, None)], ..Plan::default() };
     near(FrameErrors::of(&plan, &frame).heading_rad, TAU - 6.0);
 }
 
@@ -203,7 +195,7 @@ fn heading_error_goes_the_short_way_round() {
 fn strongest_mode_counts_but_for_min_ade() {
     let frame = accelerating(0, 5.0, 0.0);
     let motion = vec![steady(0.25, 5.0, 0.0, None), steady(0.75, 7.0, 0.0, None)];
-    let errors = FrameErrors::of(&Plan { action: None, motion }, &frame);
+    let errors = FrameErrors::of(&Plan { motion, ..Plan::default() }, &frame);
     near(errors.speed_mps[2], 2.0);
     near(errors.min_ade_m, 0.0);
 }
@@ -216,7 +208,7 @@ fn nll_is_what_a_calculator_says() {
     //   B: weight 1/4, v 0.5 1 (std 1 2), yaw 1/4 1/2 (std 1/4 1/2)
     //   p = sum(w * prod(N(v / 10, m / 10, s / 10)) * prod(N(yaw, m, s)) for A, B)
     //   -log(p) / 4 = -0.9841766566776848
-    let mut future = empty_future();
+    let mut future = Future::UNKNOWN;
     future.len = 2;
     future.speed_mps[..2].copy_from_slice(&[1.0, 2.0]);
     future.yaw_rad[..2].copy_from_slice(&[0.125, -0.25]);
@@ -275,7 +267,7 @@ fn plan_that_is_not_finite_stops_the_evaluation_and_is_named() {
         steady(0.5, 1.0, 0.0, None),
     ];
     for (mode, what) in broken.into_iter().zip(["not finite", "not positive", "probabilities"]) {
-        let plan = Plan { action: None, motion: vec![mode] };
+        let plan = Plan { motion: vec![mode], ..Plan::default() };
         let policy = Constant { name: "run".to_string(), plan };
         let frames = vec![Ok(("town-3".to_string(), accelerating(17, 5.0, 0.0)))];
         let error = evaluate(&mut [Box::new(policy)], frames).unwrap_err().to_string();
@@ -306,7 +298,7 @@ impl Policy for Counting {
     fn plan(&mut self, _: &Frame) -> Result<Plan> {
         self.0 += 1;
         let action = Action { steer: self.0 as f32, ..Action::default() };
-        Ok(Plan { action: Some(action), motion: Vec::new() })
+        Ok(Plan { action: Some(action), ..Plan::default() })
     }
 }
 
@@ -401,7 +393,7 @@ fn motions() -> impl Strategy<Value = (Vec<Mode>, Future)> {
             yaw_rad: part(i + 1, 2.5),
             ..steady(weight, 0.0, 0.0, Some([2.0 * std, std]))
         };
-        let mut future = empty_future();
+        let mut future = Future::UNKNOWN;
         future.len = len;
         (future.speed_mps, future.yaw_rad) = (part(3, 4.0), part(2, 1.5));
         (vec![mode(weight, 0, std), mode(1.0 - weight, 2, 2.0 * std)], future)
@@ -449,7 +441,7 @@ proptest! {
         for t in usize::from(future.len)..FUTURE_STEPS {
             (other.speed_mps[t], other.yaw_rad[t], other.xy_m[2 * t]) = (garbage, garbage, garbage);
         }
-        let plan = Plan { action: None, motion: modes.clone() };
+        let plan = Plan { motion: modes.clone(), ..Plan::default() };
         prop_assert_eq!(
             FrameErrors::of(&plan, &frame(future.clone())),
             FrameErrors::of(&plan, &frame(other.clone()))
@@ -463,7 +455,7 @@ proptest! {
     fn wider_intervals_hold_more_and_nearest_mode_is_no_worse((modes, mut future) in motions()) {
         future.len = FUTURE_STEPS as u8;
         let frame = Frame { future, ..accelerating(0, 5.0, 0.0) };
-        let errors = FrameErrors::of(&Plan { action: None, motion: modes }, &frame);
+        let errors = FrameErrors::of(&Plan { motion: modes, ..Plan::default() }, &frame);
         let [half, most, nearly_all] = errors.inside.map(Option::unwrap);
         prop_assert!(half <= most && most <= nearly_all);
         prop_assert!(errors.min_ade_m.unwrap() <= errors.ade_m[2].unwrap());

@@ -46,7 +46,7 @@ impl Policy for Offset {
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let speed_mps = signed_speed_mps(frame.velocity_mps) + self.0;
         let motion = vec![steady(1.0, speed_mps, 0.0, Some([2.0, 0.1]))];
-        Ok(Plan { action: None, motion })
+        Ok(Plan { motion, ..Plan::default() })
     }
 }
 

@@ -61,6 +61,7 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod sampling;
+mod tables;
 mod world;
 mod encoding;
 #[cfg(feature = "learning")]

@@ -553,6 +553,10 @@ fn trained_run_drives_with_what_its_network_says() {
     let near = |a: f32, b: f32| (a - b).abs() < 1e-5 * b;
     assert!(near(std.speed_mps[4], 10.0 * at(&motion.log_std, 2, 4, 0).exp()));
     assert!(near(std.yaw_rad[29], at(&motion.log_std, 2, 29, 1).exp()));
+    let shares = said.attention.unwrap().flatten_all().unwrap().to_vec1::<f32>().unwrap();
+    let (names, planned): (Vec<_>, Vec<_>) = plan.attention.iter().copied().unzip();
+    assert_eq!((names, planned), (policy.branches(), shares));
+    assert!((plan.attention.iter().map(|(_, share)| share).sum::<f32>() - 1.0).abs() < 1e-6);
     assert_eq!(plan, policy.plan(&frame).unwrap(), "it remembers nothing");
 }
 

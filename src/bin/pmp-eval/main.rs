@@ -1,0 +1,43 @@
+//! `pmp-eval`: policies in, tables out.
+
+mod policies;
+mod offline;
+mod drive;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use pmp::cli;
+
+/// Measure policies, and make tables of what was measured
+#[derive(Parser)]
+#[command(version, after_help = AFTER)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Offline(offline::Offline),
+    Drive(drive::Drive),
+    Table(table::Table),
+}
+
+const AFTER: &str = "\
+Examples:
+  pmp-eval offline --policy runs/tiny --data data/town --out reports/tiny
+  pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
+  pmp-eval drive --policy runs/tiny expert --suite deeptest --quick --out drives/quick
+  pmp-eval table reports/tiny reports/ab --format csv > table.csv
+
+Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
+
+fn main() -> ExitCode {
+    cli::main(|| match Args::parse().command {
+        Command::Offline(args) => offline::run(&args),
+        Command::Drive(args) => drive::run(&args),
+        Command::Table(args) => table::run(&args),
+    })
+}
