@@ -2,8 +2,15 @@
 //! both run. What is left untested without a GPU is candle's own kernels there.
 #![allow(clippy::unwrap_used)]
 
-use candle_core::{DType, Tensor, Var};
+use candle_core::{DType, Device::Cpu, Tensor, Var};
 use pmp::model::{
+    adam::Adam,
+    config::{Assign, TrainConfig},
+    gradient::Gradient,
+    init::Weights,
+    loss::LossSums,
+    net_config::{Encoder, NetConfig, PictureConfig, PmpConfig},
+    network::Network,
     ops::{
         Conv, Norm,
         adam::{Moments, Step, adam_step, sums_of_squares},
@@ -14,7 +21,10 @@ use pmp::model::{
     pass::Pass,
 };
 
-use crate::operations::{LEARN, numbers, off, pytorch, resnet};
+use crate::{
+    operations::{LEARN, numbers, off, pytorch, resnet},
+    training::{Synthetic, small_net},
+};
 
 /// Height and width where a stride of 2 leaves a pixel over in both, in one and in none: those of
 /// the paper's picture on its way.
@@ -84,7 +94,7 @@ fn max_pool_is_that_of_the_kernels_and_gives_to_the_first_of_the_largest() {
 fn batch_norm_is_that_of_the_kernels() {
     let [x, residual] = [5, 6].map(|seed| var(seed, &[2, 32, 75, 6]));
     let [scale, shift] = [7, 8].map(|seed| var(seed, &[6]));
-    let both = Tensor::stack(&[&scale, &shift], 0).unwrap();
+    let both = Tensor::stack(&[scale.as_tensor(), shift.as_tensor()], 0).unwrap();
     let kept = [numbers(9, &[6]), numbers(10, &[6]).abs().unwrap()];
     let ways = (0..8).map(|i| [i & 1 > 0, i & 2 > 0, i & 4 > 0]);
     for way @ [of_batch, with_residual, relu] in ways {
@@ -197,4 +207,66 @@ fn operations_of_bf16_are_those_of_f32_but_for_its_rounding() {
         // The bias is taken off again by the norm: its gradient is rounding alone.
         assert!(far < 0.01 || i == 2, "gradient {i}: {far}");
     }
+}
+
+/// A small network with encoders of a kind, its pictures of odd sizes, and its total loss with the
+/// encoders in a type.
+fn loss_in(encoder: Encoder, activations: Option<DType>) -> (Weights, Network, Tensor) {
+    let channels = if encoder == Encoder::Resnet34 { vec![4] } else { vec![4, 8] };
+    let picture = PictureConfig { height: 33, width: 46, encoder, channels, ..small_net().picture };
+    let picture = PictureConfig { batch_norm: true, ..picture };
+    let cfg = NetConfig::Pmp(PmpConfig { picture, ..small_net() });
+    let (weights, net) = Weights::new(3, &Cpu, |vb| Network::new(&cfg, vb)).unwrap();
+    let loss = loss_of(&net, 0, activations);
+    (weights, net, loss)
+}
+
+fn loss_of(net: &Network, step: u64, activations: Option<DType>) -> Tensor {
+    let batch = Synthetic::of_size(4, [33, 46]).batch_of(0);
+    let pass = Pass::Learn { seed: 0, step, part: 0, activations };
+    let output = net.forward(&batch.inputs, &pass).unwrap();
+    assert_eq!(output.action.dtype(), DType::F32);
+    let sums = LossSums::new(&output, &batch.targets, Assign::Soft).unwrap();
+    sums.total(&TrainConfig::default().loss, &sums.known).unwrap()
+}
+
+#[test]
+fn networks_learn_the_same_of_composed_encoders() {
+    for encoder in [Encoder::Strided, Encoder::Resnet34] {
+        let (ours, _, our_loss) = loss_in(encoder, None);
+        let (theirs, _, their_loss) = loss_in(encoder, Some(DType::F64));
+        let number = |loss: &Tensor| loss.to_scalar::<f32>().unwrap();
+        assert!((number(&our_loss) / number(&their_loss) - 1.0).abs() < 1e-5);
+        let [our_grads, their_grads] = [&our_loss, &their_loss].map(|loss| backward(loss).unwrap());
+        for ((name, our), (_, their)) in ours.parameters().zip(theirs.parameters()) {
+            let (our, their) = (our_grads.get(our).unwrap(), their_grads.get(their).unwrap());
+            assert!(off(their, our) < 1e-3, "{name}: {}", off(their, our));
+        }
+        let statistics = ours.iter().zip(theirs.iter());
+        for ((name, our), (_, their)) in
+            statistics.filter(|((name, _), _)| name.contains("running"))
+        {
+            assert!(off(their, our) < 1e-4, "{name}");
+        }
+    }
+}
+
+#[test]
+fn network_with_encoders_of_bf16_learns_by_heart_and_keeps_its_weights_in_f32() {
+    let learned = |activations: Option<DType>| {
+        let (weights, net, first) = loss_in(Encoder::Strided, activations);
+        let mut adam = Adam::new(&weights, 0.0).unwrap();
+        for step in 0..40 {
+            let mut gradient = Gradient::default();
+            let grads = backward(&loss_of(&net, step, activations)).unwrap();
+            gradient.add(&weights, grads).unwrap();
+            adam.step(&gradient, 3e-3, 5.0).unwrap();
+        }
+        assert!(weights.iter().all(|(_, var)| var.dtype() == DType::F32));
+        let number = |loss: Tensor| loss.to_scalar::<f32>().unwrap();
+        [number(first), number(loss_of(&net, 40, activations))]
+    };
+    let ([start, end], [rough_start, rough_end]) = (learned(None), learned(Some(DType::BF16)));
+    assert!(start != rough_start && (start - rough_start).abs() < 0.02, "{start} {rough_start}");
+    assert!((start - end) > 0.1 && (start - rough_end) > 0.9 * (start - end), "{end} {rough_end}");
 }
