@@ -61,4 +61,4 @@ if [ ! -e "$out/report/report.json" ]; then
 else
     "$bin/pmp-eval" table "$out/report"
 fi
-say "the table again: $out/report/table.md; a picture of it: $out/report/speed.svg"
+say "the table again: $out/report/table.md; as a page: $out/report/report.html"
