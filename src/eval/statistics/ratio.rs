@@ -23,7 +23,8 @@ impl Bootstrap {
     /// With one group, units are drawn. With several (one model trained from several seeds),
     /// groups are drawn first and then units within each, so that the interval speaks of other
     /// seeds too. A resample in which a ratio has no denominator does not count for it. `None`
-    /// for a ratio that fewer than two units have a part in, or whose end is not finite.
+    /// for a ratio that fewer than two units have a part in, whose end is not finite, or that is
+    /// the same in all resamples: what no unit shows, a bootstrap cannot see.
     pub fn ratios(&self, groups: &[Vec<Vec<Term>>]) -> Vec<Option<[f64; 2]>> {
         self.of_sums(groups, |sums| sums.iter().map(|[above, below]| above / below).collect())
     }
@@ -84,7 +85,8 @@ impl Bootstrap {
         let intervals = resampled.iter_mut().enumerate().map(|(i, values)| {
             let enough = parts.iter().skip(i).step_by(each).all(|&part| part >= 2);
             let interval = (enough && !values.is_empty()).then(|| self.middle(values))?;
-            interval.iter().all(|end| end.is_finite()).then_some(interval)
+            (interval[0] < interval[1] && interval.iter().all(|end| end.is_finite()))
+                .then_some(interval)
         });
         intervals.collect()
     }

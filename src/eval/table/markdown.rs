@@ -10,6 +10,14 @@ use crate::eval::table::{
     report::{Cell, Comparison, Source, SuccessTest, System, Table, Test, Verdict},
 };
 
+const BESIDE_DRIVEN: &str = "E empty, F few, R regular, D dense traffic. In brackets: 95 % \
+    intervals, Wilson's for shares of episodes, else a bootstrap's over episodes; those of single \
+    tasks' WL and OVSP are in the CSV and the JSON.";
+
+const BESIDE_THE_PAPER: &str = "E empty, R regular, D dense traffic. The paper prints success in \
+    whole per cents, each of which is k of 18 cut, not rounded; all tasks together with Wilson's \
+    95 % interval are computed from these k. Its `--` stand where nothing succeeded.";
+
 /// The whole of it.
 pub fn markdown(table: &Table) -> String {
     let mut blocks = vec![
@@ -19,10 +27,10 @@ pub fn markdown(table: &Table) -> String {
         },
         lines(&table.caveats, |caveat| format!("> **{caveat}**\n\n")),
         lines(&table.comparisons, |comparison| format!("- {}\n", comparison.sentence)),
-        "E empty, F few, R regular, D dense traffic. In brackets: 95 % intervals, Wilson's for \
-         shares of episodes, else a bootstrap's over episodes; those of single tasks' WL and OVSP \
-         are in the CSV and the JSON."
-            .to_string(),
+        match &table.suite {
+            Some(_) => BESIDE_DRIVEN.to_string(),
+            None => BESIDE_THE_PAPER.to_string(),
+        },
         first_table(table),
         seeds_table(table),
     ];

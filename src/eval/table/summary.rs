@@ -257,7 +257,8 @@ fn listed(names: &[String]) -> String {
 
 fn reference_caveat(matched: usize, tasks: usize) -> String {
     let of = "The paper's systems drove CARLA 0.9.7, other routes and other traffic: they are set \
-              beside these, and no test compares the two";
+              beside these, with success cut to whole per cents as printed, and no test compares the \
+              two";
     match (matched, tasks) {
         (0, _) => format!("{of}; none of these tasks is one of the paper's."),
         (matched, tasks) if matched < tasks => {
