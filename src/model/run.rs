@@ -279,6 +279,15 @@ pub fn saved_config(dir: &Path) -> Result<Option<TrainConfig>> {
     atomic::read_json_if_exists(&dir.join(CONFIG))
 }
 
+/// What a run has learned.
+#[derive(Debug)]
+pub struct Trained {
+    pub config: TrainConfig,
+    pub weights: HashMap<String, Tensor>,
+    /// Of the file of the weights.
+    pub sha256: String,
+}
+
 /// The configuration and the weights of a run: of its last checkpoint if `path` is the run
 /// directory, or of the one that `path` is (`RUN/checkpoints/step-00000300`). Where the
 /// configuration has a moving average of the weights, that is what a run is.
@@ -287,7 +296,7 @@ pub fn saved_config(dir: &Path) -> Result<Option<TrainConfig>> {
 ///
 /// [`Error::Run`] if there is no checkpoint, it is of another version, or a checksum does not
 /// match; [`Error::Json`], [`Error::Io`].
-pub fn trained(path: &Path, device: &Device) -> Result<(TrainConfig, HashMap<String, Tensor>)> {
+pub fn trained(path: &Path, device: &Device) -> Result<Trained> {
     let none = || Error::Run {
         path: path.into(),
         what: "no trained run, there is no checkpoint".into(),
@@ -304,7 +313,11 @@ pub fn trained(path: &Path, device: &Device) -> Result<(TrainConfig, HashMap<Str
     };
     let sha256 = manifest.checkpoints.get(&name).ok_or_else(none)?;
     let file = if sha256.contains_key(AVERAGE) { AVERAGE } else { WEIGHTS };
-    Ok((config, tensors(&dir.join(CHECKPOINTS).join(name), sha256, file, device)?))
+    Ok(Trained {
+        config,
+        weights: tensors(&dir.join(CHECKPOINTS).join(name), sha256, file, device)?,
+        sha256: sha256.get(file).cloned().unwrap_or_default(),
+    })
 }
 
 /// The last validation of the run in a directory, as `metrics.jsonl` has it; `None` if there was

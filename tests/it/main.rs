@@ -78,6 +78,7 @@ mod one_pixel;
 #[cfg(feature = "learning")]
 mod operations;
 mod replay;
+mod closed_loop;
 mod ranging;
 mod camera;
 mod map_fixtures;
@@ -86,5 +87,7 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "learning")]
+mod drive_cli;
 #[cfg(feature = "learning")]
 mod whole_path;

@@ -2,6 +2,7 @@
 
 mod policies;
 mod offline;
+mod drive;
 mod table;
 
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ struct Args {
 #[derive(Subcommand)]
 enum Command {
     Offline(offline::Offline),
+    Drive(drive::Drive),
     Table(table::Table),
 }
 
@@ -27,6 +29,7 @@ const AFTER: &str = "\
 Examples:
   pmp-eval offline --policy runs/tiny --data data/town --out reports/tiny
   pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
+  pmp-eval drive --policy runs/tiny expert --suite deeptest --quick --out drives/quick
   pmp-eval table reports/tiny reports/ab --format csv > table.csv
   pmp-eval table driven/ --reference paper
 
@@ -35,6 +38,7 @@ Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame wa
 fn main() -> ExitCode {
     cli::main(|| match Args::parse().command {
         Command::Offline(args) => offline::run(&args),
+        Command::Drive(args) => drive::run(&args),
         Command::Table(args) => table::run(&args),
     })
 }
