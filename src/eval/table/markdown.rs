@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use crate::eval::table::{
-    cells::{MISSING, heads, letter, pieces, table_i, title},
+    cells::{MISSING, heads, letter, pieces, systems_of, table_i, title},
     comparison::{of_test, p_text},
     definitions::{INSIDE, METRICS, Metric, TABLE_I},
     report::{Cell, Comparison, Source, SuccessTest, System, Table, Test, Verdict},
@@ -71,7 +71,7 @@ fn first_table(table: &Table) -> String {
     text += &"---:|".repeat(table.tasks.len() + 1);
     text.push('\n');
     for metric in table_i(table) {
-        for (i, system) in table.systems.iter().enumerate() {
+        for (i, system) in systems_of(table, metric).into_iter().enumerate() {
             let head =
                 if i == 0 { format!("**{}** %", title(table, metric)) } else { String::new() };
             let _ = write!(text, "| {head} | {} |", system.shown());
@@ -151,9 +151,7 @@ fn rest_table(driven: &[&System]) -> String {
         let Cell { episodes, crashed, lacking, .. } = system.pooled;
         format!(" {episodes} ({crashed}, {lacking}) |")
     });
-    let episodes = format!(
-        "| Episodes (crashed, lacking, both beside them) | {MISSING} | neither |{episodes}\n"
-    );
+    let episodes = format!("| Episodes (crashed, lacking) | {MISSING} | neither |{episodes}\n");
     head + &episodes + &shown.map(row).collect::<String>()
 }
 
@@ -215,7 +213,7 @@ fn tests_table(table: &Table) -> String {
         return rows;
     }
     "Success of pairs, two-sided exact tests. `5 : 1` is McNemar's: episodes won by the first alone \
-     and by the second alone; `18/18 : 15/18` is Fisher's, of different episodes. p is after Holm's \
+     and by the second alone; `18/18 : 15/18` is Fisher's, of unpaired episodes. p is after Holm's \
      correction over the tasks, that of all tasks over the pairs; bold is below 0.05.\n\n"
         .to_string()
         + &head
