@@ -81,15 +81,9 @@ impl Bootstrap {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut means: Vec<f64> =
             (0..self.resamples).map(|_| resampled_mean(&sums, &mut random)).collect();
-        Some(self.middle(&mut means))
-    }
-
-    /// Between which two the share [`Bootstrap::level`] of some values lies, the same number
-    /// below as above; sorts them.
-    pub(crate) fn middle(&self, values: &mut [f64]) -> [f64; 2] {
-        values.sort_unstable_by(f64::total_cmp);
+        means.sort_by(f64::total_cmp);
         let tail = (1.0 - self.level) / 2.0;
-        [quantile(values, tail), quantile(values, 1.0 - tail)]
+        Some([quantile(&means, tail), quantile(&means, 1.0 - tail)])
     }
 }
 
@@ -116,10 +110,10 @@ fn resampled_mean(sums: &[(f64, u32)], random: &mut ChaCha8Rng) -> f64 {
     total / count as f64
 }
 
-/// One of `count`, all alike.
-pub(crate) fn draw(count: usize, random: &mut ChaCha8Rng) -> usize {
+/// A number below `units`.
+pub(crate) fn draw(units: usize, random: &mut ChaCha8Rng) -> usize {
     // Multiply-shift rather than a library's range: its stream may change with its version.
-    ((u128::from(random.next_u64()) * count as u128) >> 64) as usize
+    ((u128::from(random.next_u64()) * units as u128) >> 64) as usize
 }
 
 /// Linear between the two nearest of ascending values.

@@ -39,32 +39,32 @@ impl Bootstrap {
         })
     }
 
-    /// Intervals of values that come of the sums of each term over the drawn units; value `i` is
-    /// there if, for each `j` that it divides (every `values.len()`-th), two units have a term.
+    /// Intervals of values that come of the sums of each term over the drawn units. Value `i` comes
+    /// of every `values.len()`-th term from the `i`-th on; two units must have each of these.
     fn of_sums(
         &self,
         groups: &[Vec<Vec<Term>>],
         values: impl Fn(&[[f64; 2]]) -> Vec<f64>,
     ) -> Vec<Option<[f64; 2]>> {
         let width = groups.iter().flatten().map(Vec::len).next().unwrap_or(0);
-        let mut parts = vec![0usize; width];
-        for unit in groups.iter().flatten() {
-            parts
-                .iter_mut()
-                .zip(unit)
-                .for_each(|(part, term)| *part += usize::from(term.is_some()));
-        }
+        let mut sums = vec![[0.0; 2]; width];
+        let count = values(&sums).len();
+        let units_with = |term: usize| {
+            groups.iter().flatten().filter(|unit| unit[term].is_some()).take(2).count()
+        };
+        let enough: Vec<bool> = (0..count)
+            .map(|i| (i..width).step_by(count).all(|term| units_with(term) == 2))
+            .collect();
         let groups: Vec<Vec<Vec<[f64; 2]>>> = groups
             .iter()
             .filter(|units| !units.is_empty())
             .map(|units| units.iter().map(|unit| unit.iter().map(or_nothing).collect()).collect())
             .collect();
-        let mut sums = vec![[0.0; 2]; width];
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut resampled: Vec<Vec<f64>> = vec![Vec::new(); values(&sums).len()];
-        if groups.is_empty() {
-            return vec![None; resampled.len()];
+        if !enough.contains(&true) {
+            return vec![None; count];
         }
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut resampled = vec![Vec::new(); count];
         for _ in 0..self.resamples {
             sums.fill([0.0; 2]);
             for _ in 0..groups.len() {
@@ -78,17 +78,35 @@ impl Bootstrap {
                     }
                 }
             }
-            let drawn = resampled.iter_mut().zip(values(&sums));
-            drawn.filter(|(_, value)| !value.is_nan()).for_each(|(all, value)| all.push(value));
+            for ((found, value), enough) in resampled.iter_mut().zip(values(&sums)).zip(&enough) {
+                if *enough && !value.is_nan() {
+                    found.push(value);
+                }
+            }
         }
-        let each = resampled.len().max(1);
-        let intervals = resampled.iter_mut().enumerate().map(|(i, values)| {
-            let enough = parts.iter().skip(i).step_by(each).all(|&part| part >= 2);
-            let interval = (enough && !values.is_empty()).then(|| self.middle(values))?;
-            (interval[0] < interval[1] && interval.iter().all(|end| end.is_finite()))
-                .then_some(interval)
-        });
-        intervals.collect()
+        resampled.iter_mut().map(|found| self.middle(found)).collect()
+    }
+
+    /// Between which two the share [`Bootstrap::level`] of the values lies, as many below as above.
+    fn middle(&self, values: &mut [f64]) -> Option<[f64; 2]> {
+        let first = *values.first()?;
+        if values.iter().all(|value| *value == first) {
+            return None;
+        }
+        let tail = (1.0 - self.level) / 2.0;
+        let ends = [tail, 1.0 - tail].map(|share| quantile(values, share));
+        (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
+    }
+}
+
+/// Linear between the two values nearest to that share of them; changes their order. Sorting them all
+/// would take most of the time of a table.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = share * (values.len() - 1) as f64;
+    let (_, &mut low, above) = values.select_nth_unstable_by(at as usize, f64::total_cmp);
+    match above.iter().copied().min_by(f64::total_cmp) {
+        Some(high) if at.fract() > 0.0 => low + (high - low) * at.fract(),
+        _ => low,
     }
 }
 
