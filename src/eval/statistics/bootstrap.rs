@@ -10,7 +10,7 @@ use rand_chacha::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::eval::statistics::rank::quantile;
+use crate::eval::statistics::rank::selected_quantile;
 
 /// Fewest units from which a claim is made.
 ///
@@ -114,12 +114,11 @@ impl Bootstrap {
         Some(self.middle(&mut found))
     }
 
-    /// Between which two the share [`Bootstrap::level`] of some values lies, the same number
-    /// below as above; sorts them.
+    /// Between which two the share [`Bootstrap::level`] of some values lies, as many below as above;
+    /// changes their order.
     pub(crate) fn middle(&self, values: &mut [f64]) -> [f64; 2] {
-        values.sort_unstable_by(f64::total_cmp);
         let tail = (1.0 - self.level) / 2.0;
-        [quantile(values, tail), quantile(values, 1.0 - tail)]
+        [tail, 1.0 - tail].map(|share| selected_quantile(values, share))
     }
 }
 

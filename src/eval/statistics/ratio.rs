@@ -23,7 +23,8 @@ impl Bootstrap {
     /// With one group, units are drawn. With several (one model trained from several seeds),
     /// groups are drawn first and then units within each, so that the interval speaks of other
     /// seeds too. A resample in which a ratio has no denominator does not count for it. `None`
-    /// for a ratio that fewer than two units have a part in, or whose end is not finite.
+    /// for a ratio that fewer than two units have a part in, whose end is not finite, or that is
+    /// the same in all resamples: what no unit shows, a bootstrap cannot see.
     pub fn ratios(&self, groups: &[Vec<Vec<Term>>]) -> Vec<Option<[f64; 2]>> {
         self.of_sums(groups, |sums| sums.iter().map(|[above, below]| above / below).collect())
     }
@@ -38,32 +39,32 @@ impl Bootstrap {
         })
     }
 
-    /// Intervals of values that come of the sums of each term over the drawn units; value `i` is
-    /// there if, for each `j` that it divides (every `values.len()`-th), two units have a term.
+    /// Intervals of values that come of the sums of each term over the drawn units. Value `i` comes
+    /// of every `values.len()`-th term from the `i`-th on; two units must have each of these.
     fn of_sums(
         &self,
         groups: &[Vec<Vec<Term>>],
         values: impl Fn(&[[f64; 2]]) -> Vec<f64>,
     ) -> Vec<Option<[f64; 2]>> {
         let width = groups.iter().flatten().map(Vec::len).next().unwrap_or(0);
-        let mut parts = vec![0usize; width];
-        for unit in groups.iter().flatten() {
-            parts
-                .iter_mut()
-                .zip(unit)
-                .for_each(|(part, term)| *part += usize::from(term.is_some()));
-        }
+        let mut sums = vec![[0.0; 2]; width];
+        let count = values(&sums).len();
+        let units_with = |term: usize| {
+            groups.iter().flatten().filter(|unit| unit[term].is_some()).take(2).count()
+        };
+        let enough: Vec<bool> = (0..count)
+            .map(|i| (i..width).step_by(count).all(|term| units_with(term) == 2))
+            .collect();
         let groups: Vec<Vec<Vec<[f64; 2]>>> = groups
             .iter()
             .filter(|units| !units.is_empty())
             .map(|units| units.iter().map(|unit| unit.iter().map(or_nothing).collect()).collect())
             .collect();
-        let mut sums = vec![[0.0; 2]; width];
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut resampled: Vec<Vec<f64>> = vec![Vec::new(); values(&sums).len()];
-        if groups.is_empty() {
-            return vec![None; resampled.len()];
+        if !enough.contains(&true) {
+            return vec![None; count];
         }
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut resampled = vec![Vec::new(); count];
         for _ in 0..self.resamples {
             sums.fill([0.0; 2]);
             for _ in 0..groups.len() {
@@ -77,16 +78,23 @@ impl Bootstrap {
                     }
                 }
             }
-            let drawn = resampled.iter_mut().zip(values(&sums));
-            drawn.filter(|(_, value)| !value.is_nan()).for_each(|(all, value)| all.push(value));
+            for ((found, value), enough) in resampled.iter_mut().zip(values(&sums)).zip(&enough) {
+                if *enough && !value.is_nan() {
+                    found.push(value);
+                }
+            }
         }
-        let each = resampled.len().max(1);
-        let intervals = resampled.iter_mut().enumerate().map(|(i, values)| {
-            let enough = parts.iter().skip(i).step_by(each).all(|&part| part >= 2);
-            let interval = (enough && !values.is_empty()).then(|| self.middle(values))?;
-            interval.iter().all(|end| end.is_finite()).then_some(interval)
-        });
-        intervals.collect()
+        resampled.iter_mut().map(|found| self.telling(found)).collect()
+    }
+
+    /// The middle of some values; `None` if they are all the same, or an end of it is not finite.
+    fn telling(&self, values: &mut [f64]) -> Option<[f64; 2]> {
+        let first = *values.first()?;
+        if values.iter().all(|value| *value == first) {
+            return None;
+        }
+        let ends = self.middle(values);
+        (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
     }
 }
 

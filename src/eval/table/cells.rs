@@ -2,7 +2,7 @@
 
 use crate::eval::table::{
     definitions::{Metric, TABLE_I, metric},
-    report::{Cell, Estimate, Source, Table, Task},
+    report::{Cell, Estimate, Source, System, Table, Task},
 };
 
 /// What a missing value looks like, as in the paper.
@@ -35,6 +35,13 @@ pub fn pieces(cell: &Cell, metric: &Metric, source: Source) -> Option<Pieces> {
 /// The metrics of table I that any system has.
 pub fn table_i(table: &Table) -> Vec<&'static Metric> {
     TABLE_I.iter().filter(|key| table.has(key)).filter_map(|key| metric(key)).collect()
+}
+
+/// Whose rows a metric of table I has: all that were driven, and the paper's if it prints it.
+pub fn systems_of<'t>(table: &'t Table, metric: &Metric) -> Vec<&'t System> {
+    let has = |cell: &Cell| cell.of(metric.key).value.is_some();
+    let shown = |s: &&System| s.source == Source::Driven || s.tasks.iter().any(has);
+    table.systems.iter().filter(shown).collect()
 }
 
 /// A metric's title in table I; the paper's own has no more than one OVSP.

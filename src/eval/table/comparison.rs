@@ -155,9 +155,10 @@ fn summed(metric: &Metric, rows: &[&EpisodeRow]) -> Term {
 }
 
 fn verdict(better: Better, interval: Option<[f64; 2]>, episodes: usize) -> Verdict {
-    let Some([low, high]) = interval.filter(|_| episodes >= FEWEST_UNITS) else {
+    if episodes < FEWEST_UNITS {
         return Verdict::TooFew;
-    };
+    }
+    let Some([low, high]) = interval else { return Verdict::NoDifference };
     match better {
         Better::Higher if low > 0.0 => Verdict::FirstIsBetter,
         Better::Higher if high < 0.0 => Verdict::SecondIsBetter,
@@ -247,11 +248,11 @@ fn sentence(
         [Some(a), Some(b)] => {
             format!("of the same episodes, {a} won by {} alone and {b} by {} alone", who[0], who[1])
         }
-        _ => "of different episodes".to_string(),
+        _ => "of unpaired episodes".to_string(),
     };
     let over_pairs = match pairs {
         0 | 1 => String::new(),
-        _ => format!(", {} after Holm over {pairs} pairs", p_text(test.p_holm)),
+        _ => format!(", after Holm over {pairs} pairs p {}", p_text(test.p_holm)),
     };
     let tested = comparison.tasks.iter().flatten().count();
     let decided: Vec<String> = comparison
@@ -263,8 +264,13 @@ fn sentence(
         .collect();
     let on_tasks = match (tested, decided.is_empty()) {
         (0 | 1, _) => String::new(),
-        (_, true) => format!("; after Holm over {tested} tasks it differs in no single one"),
-        (_, false) => format!("; after Holm over {tested} tasks in {}", decided.join(", ")),
+        (_, true) => format!("; after Holm over {tested} tasks they differ in none"),
+        (_, false) if decided.len() == tested => {
+            format!("; after Holm over {tested} tasks they differ in all")
+        }
+        (_, false) => {
+            format!("; after Holm over {tested} tasks they differ in {}", decided.join(", "))
+        }
     };
     format!(
         "{claim}: {k}/{n} against {other}/{m} {same} (exact {} p {}{over_pairs}){on_tasks}",

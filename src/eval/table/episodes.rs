@@ -189,7 +189,7 @@ pub fn systems<'r>(rows: &'r [EpisodeRow], groups: &[Group]) -> Result<Vec<Drive
 }
 
 /// A row as sentences name it.
-pub fn shown(row: &EpisodeRow) -> String {
+fn shown(row: &EpisodeRow) -> String {
     format!("`{}`'s {} {} {}", row.policy, row.town, row.traffic, row.episode)
 }
 

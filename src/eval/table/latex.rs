@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::eval::{
     quoting,
     table::{
-        cells::{MISSING, Pieces, heads, letter, pieces, table_i, title},
+        cells::{MISSING, Pieces, heads, letter, pieces, systems_of, table_i, title},
         report::{Source, Table},
     },
 };
@@ -33,7 +33,7 @@ pub fn latex(table: &Table) -> String {
     let _ = writeln!(text, " & {} & all \\\\", letters.collect::<String>());
     for metric in table_i(table) {
         text += "\\midrule\n";
-        for (i, system) in table.systems.iter().enumerate() {
+        for (i, system) in systems_of(table, metric).into_iter().enumerate() {
             let head = match i {
                 0 => format!("{} (\\%)", quoting::latex(title(table, metric))),
                 _ => String::new(),

@@ -4,11 +4,19 @@
 use std::fmt::Write as _;
 
 use crate::eval::table::{
-    cells::{MISSING, heads, letter, pieces, table_i, title},
+    cells::{MISSING, heads, letter, pieces, systems_of, table_i, title},
     comparison::{of_test, p_text},
     definitions::{INSIDE, METRICS, Metric, TABLE_I},
     report::{Cell, Comparison, Source, SuccessTest, System, Table, Test, Verdict},
 };
+
+const BESIDE_DRIVEN: &str = "E empty, F few, R regular, D dense traffic. In brackets: 95 % \
+    intervals, Wilson's for shares of episodes, else a bootstrap's over episodes; those of single \
+    tasks' WL and OVSP are in the CSV and the JSON.";
+
+const BESIDE_THE_PAPER: &str = "E empty, R regular, D dense traffic. The paper prints success in \
+    whole per cents, each of which is k of 18 cut, not rounded; all tasks together with Wilson's \
+    95 % interval are computed from these k. Its `--` stand where nothing succeeded.";
 
 /// The whole of it.
 pub fn markdown(table: &Table) -> String {
@@ -19,10 +27,10 @@ pub fn markdown(table: &Table) -> String {
         },
         lines(&table.caveats, |caveat| format!("> **{caveat}**\n\n")),
         lines(&table.comparisons, |comparison| format!("- {}\n", comparison.sentence)),
-        "E empty, F few, R regular, D dense traffic. In brackets: 95 % intervals, Wilson's for \
-         shares of episodes, else a bootstrap's over episodes; those of single tasks' WL and OVSP \
-         are in the CSV and the JSON."
-            .to_string(),
+        match &table.suite {
+            Some(_) => BESIDE_DRIVEN.to_string(),
+            None => BESIDE_THE_PAPER.to_string(),
+        },
         first_table(table),
         seeds_table(table),
     ];
@@ -63,7 +71,7 @@ fn first_table(table: &Table) -> String {
     text += &"---:|".repeat(table.tasks.len() + 1);
     text.push('\n');
     for metric in table_i(table) {
-        for (i, system) in table.systems.iter().enumerate() {
+        for (i, system) in systems_of(table, metric).into_iter().enumerate() {
             let head =
                 if i == 0 { format!("**{}** %", title(table, metric)) } else { String::new() };
             let _ = write!(text, "| {head} | {} |", system.shown());
@@ -143,9 +151,7 @@ fn rest_table(driven: &[&System]) -> String {
         let Cell { episodes, crashed, lacking, .. } = system.pooled;
         format!(" {episodes} ({crashed}, {lacking}) |")
     });
-    let episodes = format!(
-        "| Episodes (crashed, lacking, both beside them) | {MISSING} | neither |{episodes}\n"
-    );
+    let episodes = format!("| Episodes (crashed, lacking) | {MISSING} | neither |{episodes}\n");
     head + &episodes + &shown.map(row).collect::<String>()
 }
 
@@ -207,7 +213,7 @@ fn tests_table(table: &Table) -> String {
         return rows;
     }
     "Success of pairs, two-sided exact tests. `5 : 1` is McNemar's: episodes won by the first alone \
-     and by the second alone; `18/18 : 15/18` is Fisher's, of different episodes. p is after Holm's \
+     and by the second alone; `18/18 : 15/18` is Fisher's, of unpaired episodes. p is after Holm's \
      correction over the tasks, that of all tasks over the pairs; bold is below 0.05.\n\n"
         .to_string()
         + &head

@@ -15,7 +15,7 @@ use crate::{
         table::{
             comparison,
             definitions::{CRASHED, METRICS, Measure, Metric},
-            episodes::{Driven, Group, Key, key, shown, systems, tasks},
+            episodes::{Driven, Group, Key, key, systems, tasks},
             paper::Paper,
             report::{
                 Cell, Definition, Estimate, Seed, Source, System, Table, Task, Touched, VERSION,
@@ -206,15 +206,12 @@ fn crashes(system: &Driven) -> Option<String> {
     let first = crashed.first()?;
     let names: Vec<String> = crashed.iter().map(|row| place(&key(row))).collect();
     Some(format!(
-        "`{}` crashed in {} of {} episodes, which are in no number: {} ({}).",
+        "`{}` crashed in {} of {} episodes, which are in no number: {}; the first said: {}.",
         system.name,
         crashed.len(),
         system.rows().count(),
         listed(&names),
-        match &first.error {
-            Some(error) => format!("{}: {error}", shown(first)),
-            None => "without a word".to_string(),
-        },
+        first.error.as_deref().unwrap_or("nothing"),
     ))
 }
 
@@ -257,7 +254,8 @@ fn listed(names: &[String]) -> String {
 
 fn reference_caveat(matched: usize, tasks: usize) -> String {
     let of = "The paper's systems drove CARLA 0.9.7, other routes and other traffic: they are set \
-              beside these, and no test compares the two";
+              beside these, with success cut to whole per cents as printed, and no test compares the \
+              two";
     match (matched, tasks) {
         (0, _) => format!("{of}; none of these tasks is one of the paper's."),
         (matched, tasks) if matched < tasks => {
