@@ -42,8 +42,12 @@ mod conventions;
 mod readers;
 mod real_drive;
 mod evaluation;
-#[cfg(feature = "learning")]
+mod offline_metrics;
+mod calibration;
 mod evaluation_report;
+mod chart;
+#[cfg(feature = "learning")]
+mod evaluation_cli;
 #[cfg(feature = "learning")]
 mod samples;
 #[cfg(feature = "learning")]
@@ -61,7 +65,10 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod sampling;
+mod statistics;
 mod tables;
+#[cfg(feature = "learning")]
+mod tables_cli;
 mod world;
 mod encoding;
 #[cfg(feature = "learning")]
@@ -77,6 +84,7 @@ mod operations;
 #[cfg(feature = "learning")]
 mod composed;
 mod replay;
+mod closed_loop;
 mod ranging;
 mod camera;
 mod map_fixtures;
@@ -85,5 +93,7 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "learning")]
+mod drive_cli;
 #[cfg(feature = "learning")]
 mod whole_path;

@@ -22,6 +22,7 @@ use pmp::{
         split::Split,
     },
     drops::{Drops, Reason},
+    eval::table,
     frame::Conditions,
     log::{
         clock::Clock,
@@ -352,4 +353,11 @@ fn driven_episode_columns_are_those_of_the_schema_file_and_of_a_row() {
     let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(&path).unwrap()).unwrap();
     assert_eq!(written_columns(reader.schema()), listed);
     assert_eq!(reader.schema().metadata()[results::VERSION_KEY], "1");
+}
+
+#[test]
+fn a_closed_loop_table_has_the_fields_of_the_schema_file() {
+    let values = crate::tables::of_every_kind().map(|table| serde_json::to_value(table).unwrap());
+    same_fields(&values, &schema_file("table.v1.json")["fields"]);
+    assert_eq!(table::report::VERSION, 1, "a new version needs a new file, table.v2.json");
 }
