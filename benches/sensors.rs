@@ -16,7 +16,7 @@ use pmp::{
     },
     sensors::{camera::Camera, lidar, radar, rays::Reach},
     sim::{
-        drive::Drive,
+        drive::Demonstration,
         plan::Episode,
         record::{Recipe, record},
         rig::Rig,
@@ -76,7 +76,7 @@ fn spent_s() -> f64 {
 /// Seconds spent on each part of the measured steps.
 fn sense(stage: &Stage, episode: &Episode) -> BTreeMap<&'static str, f64> {
     let (rig, shapes) = (Rig::default(), Shapes::new());
-    let mut drive = Drive::new(&stage.town, episode, 0.0).unwrap();
+    let mut demonstration = Demonstration::new(&stage.town, episode, 0.0).unwrap();
     let mut camera = Camera::new(rig.camera.clone());
     let noise = |purpose| Noise::new(episode.seed, episode.number, purpose);
     let (mut lidar_noise, mut radar_noise) = (noise(Purpose::Lidar), noise(Purpose::Radar));
@@ -91,8 +91,9 @@ fn sense(stage: &Stage, episode: &Episode) -> BTreeMap<&'static str, f64> {
             }
         };
         for _ in 0..SUBSTEPS {
-            drive.step();
+            demonstration.step();
         }
+        let drive = &demonstration.drive;
         lap("world");
         let (ego, ground_m) = (*drive.world.ego(), drive.world.ground_m());
         let instant = Instant::of(&drive.world.snapshot(), &shapes);

@@ -169,6 +169,16 @@ pub struct Future {
     pub len: u8,
 }
 
+impl Future {
+    /// Nothing is known of what comes.
+    pub const UNKNOWN: Future = Future {
+        speed_mps: [0.0; FUTURE_STEPS],
+        yaw_rad: [0.0; FUTURE_STEPS],
+        xy_m: [0.0; 2 * FUTURE_STEPS],
+        len: 0,
+    };
+}
+
 /// Sample time minus grid time, ns; `None` where the sample is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Skew {

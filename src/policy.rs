@@ -19,6 +19,14 @@ pub struct Action {
     pub brake: f32,
 }
 
+impl Action {
+    /// Why it is none, if it is none.
+    pub fn fault(&self) -> Option<&'static str> {
+        let is_finite = [self.steer, self.throttle, self.brake].iter().all(|v| v.is_finite());
+        (!is_finite).then_some("planned an action that is not finite")
+    }
+}
+
 /// One manoeuvre over the next 3 s: independent normals per step for speed and yaw change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
@@ -56,6 +64,38 @@ impl Plan {
     pub fn strongest(&self) -> Option<&Mode> {
         self.motion.iter().reduce(|best, mode| if mode.weight > best.weight { mode } else { best })
     }
+
+    /// Why a plan is none, if it is none. A value that is not finite would spread into every mean,
+    /// and leaving its frame out would flatter the policy.
+    pub fn fault(&self) -> Option<&'static str> {
+        let finite = |mode: &Mode| {
+            mode.weight.is_finite()
+                && mode.speed_mps.iter().chain(&mode.yaw_rad).all(|value| value.is_finite())
+        };
+        let positive = |mode: &Mode| {
+            mode.std.as_ref().is_none_or(|std| {
+                std.speed_mps
+                    .iter()
+                    .chain(&std.yaw_rad)
+                    .all(|value| value.is_normal() && *value > 0.0)
+            })
+        };
+        let action = self.action.unwrap_or_default();
+        let weights: f32 = self.motion.iter().map(|mode| mode.weight).sum();
+        if let Some(fault) = action.fault() {
+            Some(fault)
+        } else if !self.motion.iter().all(finite) {
+            Some("planned a motion that is not finite")
+        } else if !self.motion.iter().all(positive) {
+            Some("planned a standard deviation that is not positive and finite")
+        } else if self.motion.iter().any(|mode| mode.weight < 0.0)
+            || (!self.motion.is_empty() && (weights - 1.0).abs() > 1e-3)
+        {
+            Some("planned modes whose weights are no probabilities")
+        } else {
+            None
+        }
+    }
 }
 
 impl Mode {
@@ -77,6 +117,19 @@ impl Mode {
     }
 }
 
+/// Sensors that a policy looks at. Velocity, route and command are always there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Senses {
+    pub camera: bool,
+    /// Lidar and radar.
+    pub ranging: bool,
+}
+
+impl Senses {
+    pub const ALL: Senses = Senses { camera: true, ranging: true };
+    pub const NONE: Senses = Senses { camera: false, ranging: false };
+}
+
 /// Something that drives.
 ///
 /// A policy looks at what the car sensed, its state, its route and its command. It must not look
@@ -96,6 +149,11 @@ pub trait Policy {
     /// If the frame cannot be used: a picture that cannot be decoded, a tensor operation that
     /// fails.
     fn plan(&mut self, frame: &Frame) -> Result<Plan>;
+
+    /// What the policy looks at; the rest of a frame need not be there.
+    fn senses(&self) -> Senses {
+        Senses::ALL
+    }
 
     /// Whether the policy reads what the recorded driver did next: an oracle, not a driver.
     fn sees_the_future(&self) -> bool {

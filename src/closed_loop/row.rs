@@ -44,7 +44,7 @@ pub struct EpisodeRow {
     pub touched: Option<String>,
     /// Whether the ego vehicle caused the contact.
     pub at_fault: Option<bool>,
-    /// Speed along the line between both bodies at the contact.
+    /// Length of the difference of both velocities at the contact.
     pub impact_mps: Option<f64>,
     pub wrong_lane_s: f64,
     pub wrong_lane_m: f64,

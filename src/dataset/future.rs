@@ -13,12 +13,7 @@ const STEP_NS: i64 = 100_000_000;
 /// Steps end where the track ends or has a gap; what follows is zero and not counted in `len`.
 /// `now` must be the track's state at `stamp_ns`.
 pub fn future(track: &EgoTrack, stamp_ns: i64, now: &EgoState) -> Future {
-    let mut future = Future {
-        speed_mps: [0.0; FUTURE_STEPS],
-        yaw_rad: [0.0; FUTURE_STEPS],
-        xy_m: [0.0; 2 * FUTURE_STEPS],
-        len: 0,
-    };
+    let mut future = Future::UNKNOWN;
     for step in 0..FUTURE_STEPS {
         let (from_ns, to_ns) =
             (stamp_ns + step as i64 * STEP_NS, stamp_ns + (step as i64 + 1) * STEP_NS);

@@ -1,6 +1,6 @@
 //! Lidar and radar onto the picture: the nearest return of each pixel (paper §III.C2).
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use half::f16;
 
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
     log::{
         cloud::Cloud,
         conventions::RadarRule,
-        signals::{Kind, Pose},
+        signals::{Kind, Pose, RadarReturn},
         value::Struct,
     },
     projection::{Camera, NEAR_M, Nearest},
@@ -39,9 +39,20 @@ pub fn lidar_pixels(
         camera_from_points.rotation,
         camera_from_points.position_m,
     );
+    Ok(lidar_on_picture(cloud.positions(xyz), &camera_from_points, camera))
+}
+
+/// Places in any frame on the picture, the nearest of each pixel.
+///
+/// `camera_from_points` leads from their frame into the camera's optical frame.
+pub fn lidar_on_picture(
+    points_m: impl Iterator<Item = DVec3>,
+    camera_from_points: &DAffine3,
+    camera: &Camera,
+) -> LidarPixels {
     let (depth, ahead_m) = (camera_from_points.matrix3.row(2), camera_from_points.translation.z);
     let mut nearest = Nearest::new(camera);
-    for point_m in cloud.positions(xyz) {
+    for point_m in points_m {
         // Half of a turn lies behind the camera, and one coordinate tells.
         let depth_m = depth.x * point_m.x + depth.y * point_m.y + depth.z * point_m.z + ahead_m;
         if depth_m.is_nan() || depth_m <= NEAR_M {
@@ -57,7 +68,7 @@ pub fn lidar_pixels(
         pixels.y.push(f16::from_f64(point_m.y));
         pixels.z.push(f16::from_f64(point_m.z));
     }
-    Ok(pixels)
+    pixels
 }
 
 /// Radar returns of a scan, a list of tracks or a cloud on the picture. Returns without a finite
@@ -74,6 +85,15 @@ pub fn radar_pixels(
     camera: &Camera,
 ) -> Result<RadarPixels> {
     let returns = radar::returns(kind, message, rule)?;
+    Ok(radar_on_picture(&returns, camera_from_sensor, camera))
+}
+
+/// Radar returns on the picture, the nearest of each pixel.
+pub fn radar_on_picture(
+    returns: &[RadarReturn],
+    camera_from_sensor: &Pose,
+    camera: &Camera,
+) -> RadarPixels {
     let has_speeds = returns.iter().any(|r| r.radial_speed_mps.is_some());
     let mut nearest = Nearest::new(camera);
     for r in returns {
@@ -89,5 +109,5 @@ pub fn radar_pixels(
     }
     // An empty scan is one of a radar with speeds: nothing says that it has none.
     let speed_mps = (has_speeds || pixel.is_empty()).then_some(speed);
-    Ok(RadarPixels { pixel, speed_mps })
+    RadarPixels { pixel, speed_mps }
 }

@@ -3,7 +3,7 @@
 use crate::{
     error::Result,
     frame::{FUTURE_STEPS, Frame, signed_speed_mps},
-    policy::{Action, Mode, Plan, Policy},
+    policy::{Action, Mode, Plan, Policy, Senses},
 };
 
 /// Names that [`baseline`] knows.
@@ -33,6 +33,10 @@ impl Policy for ConstantVelocity {
 
     fn reset(&mut self) {}
 
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
+
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let speed_mps = signed_speed_mps(frame.velocity_mps);
         let motion = vec![certain([speed_mps; FUTURE_STEPS], [0.0; FUTURE_STEPS])];
@@ -51,6 +55,10 @@ impl Policy for StandStill {
     }
 
     fn reset(&mut self) {}
+
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
 
     fn plan(&mut self, _: &Frame) -> Result<Plan> {
         let action = Action { steer: 0.0, throttle: 0.0, brake: 1.0 };
@@ -72,6 +80,10 @@ impl Policy for Recorded {
     }
 
     fn reset(&mut self) {}
+
+    fn senses(&self) -> Senses {
+        Senses::NONE
+    }
 
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let recorded = frame.action;

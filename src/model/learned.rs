@@ -17,9 +17,9 @@ use crate::{
         network::Network,
         output::Output,
         pass::Pass,
-        run,
+        run::{self, Trained},
     },
-    policy::{Action, Mode, ModeStd, Plan, Policy},
+    policy::{Action, Mode, ModeStd, Plan, Policy, Senses},
 };
 
 /// A run directory that drives. It looks at one frame at a time and remembers nothing.
@@ -29,6 +29,7 @@ pub struct Learned {
     net: Network,
     size: Option<InputSize>,
     device: Device,
+    sha256: String,
 }
 
 impl Learned {
@@ -38,7 +39,7 @@ impl Learned {
     ///
     /// Those of [`run::trained`]; [`Error::Run`] if the weights do not fit the configuration.
     pub fn open(dir: &Path, device: &Device) -> Result<Self> {
-        let (config, weights) = run::trained(dir, device)?;
+        let Trained { config, weights, sha256 } = run::trained(dir, device)?;
         let vb = VarBuilder::from_tensors(weights, DType::F32, device);
         let net = Network::new(&config.net, vb).map_err(|e| Error::Run {
             path: dir.into(),
@@ -46,7 +47,7 @@ impl Learned {
             hint: None,
         })?;
         let name = dir.file_name().unwrap_or(dir.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, net, size: config.net.input_size(), device: device.clone() })
+        Ok(Self { name, net, size: config.net.input_size(), device: device.clone(), sha256 })
     }
 
     /// What the network says of one frame, `B` = 1.
@@ -57,6 +58,16 @@ impl Learned {
     pub fn output(&self, frame: &Frame) -> Result<Output> {
         let sample = Sample::new(frame, self.size)?;
         self.net.forward(&Inputs::stack(&[&sample], &self.device)?, &Pass::Judge)
+    }
+
+    /// SHA-256 of the file of its weights.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// Whether it plans motion beside a direct action.
+    pub fn plans_motion(&self) -> bool {
+        self.net.plans_motion()
     }
 
     /// Whether it looks at no picture: neither the camera's nor that of lidar and radar.
@@ -76,6 +87,10 @@ impl Policy for Learned {
     }
 
     fn reset(&mut self) {}
+
+    fn senses(&self) -> Senses {
+        self.net.senses()
+    }
 
     fn plan(&mut self, frame: &Frame) -> Result<Plan> {
         let output = self.output(frame)?;

@@ -9,6 +9,7 @@ use crate::{
         cil::Cil, describe::Layer, int::Int, net_config::NetConfig, output::Output, pass::Pass,
         pmp::Pmp,
     },
+    policy::Senses,
 };
 
 /// One of the networks.
@@ -39,6 +40,19 @@ impl Network {
         match self {
             Network::Pmp(net) => net.branches(),
             Network::Cil(_) | Network::Int(_) => vec![],
+        }
+    }
+
+    /// Whether it gives a mixture over future motion.
+    pub fn plans_motion(&self) -> bool {
+        matches!(self, Network::Pmp(_))
+    }
+
+    /// What the network looks at.
+    pub fn senses(&self) -> Senses {
+        match self {
+            Network::Pmp(net) => net.senses(),
+            Network::Cil(_) | Network::Int(_) => Senses { camera: true, ranging: false },
         }
     }
 

@@ -30,6 +30,7 @@ use crate::{
         output::{self, Output},
         pass::Pass,
     },
+    policy::Senses,
 };
 
 /// The network.
@@ -109,6 +110,11 @@ impl Pmp {
         let eyes = eyes.into_iter().filter_map(|(eye, name)| eye.as_ref().map(|_| name));
         let others = others.into_iter().filter_map(|(fc, name)| fc.as_ref().map(|_| name));
         eyes.chain(others).collect()
+    }
+
+    /// What the network looks at.
+    pub fn senses(&self) -> Senses {
+        Senses { camera: self.camera.is_some(), ranging: self.ralidar.is_some() }
     }
 
     /// The layers in the way of the data, for one frame.

@@ -124,8 +124,8 @@ impl RunDir {
     /// Start a run in a directory that does not exist or is empty, or continue one.
     ///
     /// With `resume`, a directory without a run is started, one with a run must have the same
-    /// configuration (`steps` may be more) and the same dataset; without a checkpoint it starts
-    /// from step 0.
+    /// configuration (`steps` may be more, `device` another) and the same dataset; without a
+    /// checkpoint it starts from step 0.
     ///
     /// # Errors
     ///
@@ -166,12 +166,11 @@ impl RunDir {
                 hint: Some("give the dataset it was started with, or another `--out`".into()),
             });
         }
-        let more_steps = saved.steps < config.steps;
-        if more_steps {
-            saved.steps = config.steps;
-        }
+        let changes = saved.steps < config.steps || saved.device != config.device;
+        saved.steps = saved.steps.max(config.steps);
+        saved.device = config.device;
         same(&as_read(dir, &saved)?, &as_read(dir, config)?, "")?;
-        if more_steps {
+        if changes {
             atomic::write_json(&dir.join(CONFIG), &saved)?;
         }
         let kept = manifest.as_ref().map(|m| m.checkpoints.clone()).unwrap_or_default();
@@ -279,6 +278,15 @@ pub fn saved_config(dir: &Path) -> Result<Option<TrainConfig>> {
     atomic::read_json_if_exists(&dir.join(CONFIG))
 }
 
+/// What a run has learned.
+#[derive(Debug)]
+pub struct Trained {
+    pub config: TrainConfig,
+    pub weights: HashMap<String, Tensor>,
+    /// Of the file of the weights.
+    pub sha256: String,
+}
+
 /// The configuration and the weights of a run: of its last checkpoint if `path` is the run
 /// directory, or of the one that `path` is (`RUN/checkpoints/step-00000300`). Where the
 /// configuration has a moving average of the weights, that is what a run is.
@@ -287,7 +295,7 @@ pub fn saved_config(dir: &Path) -> Result<Option<TrainConfig>> {
 ///
 /// [`Error::Run`] if there is no checkpoint, it is of another version, or a checksum does not
 /// match; [`Error::Json`], [`Error::Io`].
-pub fn trained(path: &Path, device: &Device) -> Result<(TrainConfig, HashMap<String, Tensor>)> {
+pub fn trained(path: &Path, device: &Device) -> Result<Trained> {
     let none = || Error::Run {
         path: path.into(),
         what: "no trained run, there is no checkpoint".into(),
@@ -304,7 +312,11 @@ pub fn trained(path: &Path, device: &Device) -> Result<(TrainConfig, HashMap<Str
     };
     let sha256 = manifest.checkpoints.get(&name).ok_or_else(none)?;
     let file = if sha256.contains_key(AVERAGE) { AVERAGE } else { WEIGHTS };
-    Ok((config, tensors(&dir.join(CHECKPOINTS).join(name), sha256, file, device)?))
+    Ok(Trained {
+        config,
+        weights: tensors(&dir.join(CHECKPOINTS).join(name), sha256, file, device)?,
+        sha256: sha256.get(file).cloned().unwrap_or_default(),
+    })
 }
 
 /// The last validation of the run in a directory, as `metrics.jsonl` has it; `None` if there was
@@ -389,7 +401,10 @@ fn same(saved: &Value, wanted: &Value, key: &str) -> Result<()> {
     Err(Error::Config {
         key: key.into(),
         what: format!("the run was started with {saved}, not {wanted}"),
-        hint: Some("leave it as it was (`steps` may be raised), or start a new run".into()),
+        hint: Some(
+            "leave it as it was (`steps` may be raised, `device` changed), or start a new run"
+                .into(),
+        ),
     })
 }
 

@@ -70,8 +70,19 @@ impl Weather {
 }
 
 /// Light and weather of an episode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct Sky {
     pub illumination: Illumination,
     pub weather: Weather,
+}
+
+impl Sky {
+    /// The sky of a name: weather, then illumination, as `storm-dark`.
+    pub fn from_name(name: &str) -> Option<Sky> {
+        let (weather, illumination) = name.split_once('-')?;
+        Some(Sky {
+            illumination: Illumination::ALL.into_iter().find(|i| i.name() == illumination)?,
+            weather: Weather::ALL.into_iter().find(|w| w.name() == weather)?,
+        })
+    }
 }

@@ -49,10 +49,13 @@ impl Packed {
     }
 }
 
-/// x, y, z, intensity, and the ring where `with_ring`.
-///
-/// Rounded to 1/256 m and 1/256 of full intensity, which is finer than the noise: a quarter of
-/// the bytes of a drive would otherwise be noise in the last bits.
+/// Places (m) and intensities of lidar returns are told in steps of 1/256, which is finer than the
+/// noise: a quarter of the bytes of a drive would otherwise be noise in the last bits.
+pub fn told(value: f32) -> f32 {
+    nearest(value * 256.0) as f32 / 256.0
+}
+
+/// x, y, z, intensity, and the ring where `with_ring`, as they are [`told`].
 pub fn of_lidar(returns: &[LidarReturn], with_ring: bool) -> Packed {
     let fields = [
         ("x", Number::F32),
@@ -65,7 +68,7 @@ pub fn of_lidar(returns: &[LidarReturn], with_ring: bool) -> Packed {
     let mut cloud = Packed::new(fields, returns.len());
     for point in returns {
         let [x, y, z] = point.position_m;
-        cloud.put([x, y, z, point.intensity].map(|value| nearest(value * 256.0) as f32 / 256.0));
+        cloud.put([x, y, z, point.intensity].map(told));
         if with_ring {
             cloud.data.extend_from_slice(&point.ring.to_le_bytes());
         }
@@ -73,7 +76,8 @@ pub fn of_lidar(returns: &[LidarReturn], with_ring: bool) -> Packed {
     cloud
 }
 
-fn place(point: &RadarReturn) -> [f32; 3] {
+/// Where a radar return is, radar frame, m.
+pub fn place(point: &RadarReturn) -> [f32; 3] {
     let place_m = point.range_m * direction(point.azimuth_rad, point.elevation_rad);
     place_m.as_vec3().to_array()
 }

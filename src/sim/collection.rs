@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     atomic::{self, UNFINISHED, file_name},
+    claim::claim,
     error::{Error, Result},
     log::head,
     scene::shapes::Shapes,
@@ -125,34 +126,8 @@ impl Collection {
 
     /// Make the folder this plan's, or see that it is: its plan file, locked, and the digest.
     fn claim(&self) -> Result<(File, String)> {
-        let (path, wanted) = (self.out.join(PLAN_FILE), self.plan_file()?);
-        match atomic::read_json_if_exists::<PlanFile>(&path)? {
-            None => {
-                atomic::write_json(&path, &wanted)?;
-            }
-            Some(found) if found == wanted => {}
-            Some(found) => {
-                let differing = found.differing(&wanted).join(", ");
-                return Err(Error::Exists {
-                    path,
-                    hint: format!(
-                        "the folder has a collection with other settings ({differing}); choose \
-                         another --out, or give the same settings to go on"
-                    ),
-                });
-            }
-        }
-        let file = File::open(&path).map_err(Error::io("open", &path))?;
-        file.try_lock().map_err(|error| match error {
-            fs::TryLockError::WouldBlock => Error::Config {
-                key: "--out".into(),
-                what: format!("another process records into {}", self.out.display()),
-                hint: Some("wait for it, or choose another folder".into()),
-            },
-            fs::TryLockError::Error(source) => {
-                Error::Io { action: "lock", path: path.clone(), source }
-            }
-        })?;
+        let path = self.out.join(PLAN_FILE);
+        let file = claim(&path, &self.plan_file()?, "collection", PlanFile::differing)?;
         let digest = atomic::sha256_of_file(&path)?;
         Ok((file, digest))
     }
@@ -204,7 +179,7 @@ impl Collection {
 
 impl PlanFile {
     /// Names of the settings in which two differ.
-    fn differing(&self, other: &PlanFile) -> Vec<&'static str> {
+    fn differing(&self, other: &PlanFile) -> Vec<String> {
         let (a, b) = (&self.plan, &other.plan);
         let settings = [
             ("version of pmp", self.pmp == other.pmp),
@@ -219,7 +194,8 @@ impl PlanFile {
             ("perturb", self.perturb == other.perturb),
             ("beams", self.beams == other.beams),
         ];
-        settings.into_iter().filter(|(_, is_same)| !is_same).map(|(name, _)| name).collect()
+        let differ = settings.into_iter().filter(|(_, is_same)| !is_same);
+        differ.map(|(name, _)| name.to_string()).collect()
     }
 }
 

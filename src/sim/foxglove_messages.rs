@@ -10,7 +10,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use crate::{
     log::protobuf_messages::{Control, Imu, Situation},
-    policy::Action,
+    policy::{Action, Mode},
     projection::Camera,
     sensors::{gnss::GnssFix, odometry::OdometryReading},
     sim::{
@@ -121,6 +121,18 @@ pub fn messages(stamp_ns: i64, reading: &Reading, rig: &Rig) -> Vec<Sent> {
             vec![Sent::new("/objects", SceneUpdate { deletions: Vec::new(), entities })]
         }
     }
+}
+
+/// The way that a mode of a plan means to go, from the car.
+pub fn planned_motion(stamp_ns: i64, mode: &Mode, speed_mps: f32) -> Sent {
+    let places = mode.positions_m(speed_mps).into_iter().zip(mode.yaw_rad);
+    let poses = places.map(|([x, y], yaw_rad)| {
+        let orientation = DQuat::from_rotation_z(f64::from(yaw_rad));
+        pose(&reading::Pose { position_m: DVec3::new(x, y, 0.0), orientation })
+    });
+    let timestamp = Some(timestamp(stamp_ns));
+    let path = PosesInFrame { timestamp, frame_id: EGO.into(), poses: poses.collect() };
+    Sent::new("/policy/planned_motion", path)
 }
 
 const SECOND_NS: i64 = 1_000_000_000;
@@ -258,13 +270,11 @@ fn entity(stamp_ns: i64, object: &Object) -> SceneEntity {
         ObjectKind::Walker(_) => ("pedestrian", [1.0, 0.2, 0.4]),
     };
     let kind = match object.kind {
-        ObjectKind::Vehicle(kind) => format!("{kind:?}"),
-        ObjectKind::Walker(kind) => format!("{kind:?}"),
+        ObjectKind::Vehicle(kind) => kind.name(),
+        ObjectKind::Walker(kind) => kind.name(),
     };
-    let words = [
-        ("kind", kind.to_lowercase()),
-        ("speed_mps", format!("{:.2}", object.velocity_mps.length())),
-    ];
+    let words =
+        [("kind", kind.to_string()), ("speed_mps", format!("{:.2}", object.velocity_mps.length()))];
     SceneEntity {
         timestamp: Some(timestamp(stamp_ns)),
         frame_id: WORLD.into(),

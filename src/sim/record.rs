@@ -12,7 +12,7 @@ use crate::{
     scene::shapes::Shapes,
     sim::{
         clocks::{CLOCKS, STEPS_PER_S},
-        drive::Drive,
+        drive::{Demonstration, Drive},
         foxglove_messages,
         message::{Encoding, Sent},
         plan::Episode,
@@ -114,11 +114,12 @@ pub fn record(
     let mut log = LogWriter::create(path, recipe.log_options())?;
     log.write_metadata(identity.0, identity.1)?;
     log.write_metadata(CONDITIONS_RECORD, &words(episode, recipe))?;
-    let mut drive = Drive::new(&stage.town, episode, recipe.burst_chance)?;
-    let mut recorder = Recorder::new(stage, shapes, episode, recipe, &drive);
+    let mut demonstration = Demonstration::new(&stage.town, episode, recipe.burst_chance)?;
+    let mut recorder = Recorder::new(stage, shapes, episode, recipe, &demonstration.drive);
     let limit = recipe.seconds.map_or(u64::MAX, |s| (s * STEPS_PER_S as f64).round() as u64);
     loop {
-        recorder.sample(&drive);
+        let drive = &demonstration.drive;
+        recorder.sample(drive);
         for (log_time_ns, sent) in recorder.arrived() {
             log.write(sent.topic, sent.message.as_ref(), log_time_ns)?;
         }
@@ -128,9 +129,9 @@ pub fn record(
         if drive.steps() >= limit || drive.is_over() {
             break;
         }
-        recorder.step(&mut drive);
+        recorder.step(&mut demonstration);
     }
-    log.write_metadata(OUTCOME_RECORD, &outcome(&drive))?;
+    log.write_metadata(OUTCOME_RECORD, &outcome(&demonstration.drive))?;
     log.finish()
 }
 
@@ -148,8 +149,8 @@ fn words(episode: &Episode, recipe: &Recipe) -> BTreeMap<String, String> {
     words.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?))).collect()
 }
 
-/// How the drive ended, and how far it came.
-fn outcome(drive: &Drive) -> BTreeMap<String, String> {
+/// How the drive ended, and how far it came, as key and value.
+pub fn outcome(drive: &Drive) -> BTreeMap<String, String> {
     let world = &drive.world;
     let end = drive.end().map_or("cut-off", |end| end.name());
     let words = [
@@ -201,9 +202,9 @@ impl<'t> Recorder<'t> {
         recorder
     }
 
-    fn step(&mut self, drive: &mut Drive) {
-        self.senses.before_step(drive);
-        drive.step();
+    fn step(&mut self, demonstration: &mut Demonstration) {
+        self.senses.before_step(&demonstration.drive);
+        demonstration.step();
         self.stamp_ns += STEP_NS;
     }
 

@@ -19,7 +19,7 @@ use crate::{
     },
     sensors::{camera::Camera, lidar, radar, rays::Reach},
     sim::{
-        drive::Drive,
+        drive::Demonstration,
         plan::Episode,
         reading::{Object, ObjectKind, objects},
         rig::Rig,
@@ -59,11 +59,11 @@ struct Moment {
 ///
 /// # Errors
 ///
-/// As [`Drive::new`].
+/// As [`Demonstration::new`].
 pub fn draw(town: Town, seed: u64) -> Result<Sheet> {
     let name = town.name.clone();
     let episode = Episode { number: 0, seed, town: name, sky: CLEAR_DAY, traffic: Density::Dense };
-    let snapshot = busiest(Drive::new(&town, &episode, 0.0)?);
+    let snapshot = busiest(Demonstration::new(&town, &episode, 0.0)?);
     let moment = Moment {
         rig: Rig::default(),
         stage: Stage::new(town),

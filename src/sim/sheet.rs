@@ -17,7 +17,7 @@ use crate::{
         surroundings::Surroundings,
     },
     sensors::camera::{Camera, CameraConfig},
-    sim::{drive::Drive, plan::Episode},
+    sim::{drive::Demonstration, plan::Episode},
     world::{density::Density, ego::Car, snapshot::Snapshot, town::Town},
 };
 
@@ -73,7 +73,7 @@ impl Sheet {
 ///
 /// # Errors
 ///
-/// As [`Drive::new`].
+/// As [`Demonstration::new`].
 pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
     let surroundings = Surroundings::of(&town.map, &town.scenery);
     let shapes = Shapes::new();
@@ -90,7 +90,7 @@ pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
     };
     for (column, traffic) in Density::ALL.into_iter().enumerate() {
         let episode = Episode { number: 0, seed, town: town.name.clone(), sky: CLEAR_DAY, traffic };
-        let moment = busiest(Drive::new(town, &episode, 0.0)?);
+        let moment = busiest(Demonstration::new(town, &episode, 0.0)?);
         take(&moment, CLEAR_DAY, column, Illumination::ALL.len());
         if traffic == Density::Dense {
             for (row, illumination) in Illumination::ALL.into_iter().enumerate() {
@@ -104,10 +104,11 @@ pub fn draw(town: &Town, seed: u64) -> Result<Sheet> {
 }
 
 /// The moment of a drive with most people and vehicles close ahead.
-pub fn busiest(mut drive: Drive) -> Snapshot {
-    let mut best = (0.0, drive.world.snapshot());
-    while drive.world.time_s() < WATCHED_S && !drive.is_over() {
-        drive.step();
+pub fn busiest(mut demonstration: Demonstration) -> Snapshot {
+    let mut best = (0.0, demonstration.drive.world.snapshot());
+    while demonstration.drive.world.time_s() < WATCHED_S && !demonstration.drive.is_over() {
+        demonstration.step();
+        let drive = &demonstration.drive;
         if drive.steps().is_multiple_of(BETWEEN_STEPS) {
             let snapshot = drive.world.snapshot();
             let worth = worth(&snapshot);

@@ -11,15 +11,33 @@ use crate::{
     },
 };
 
-/// The goal is reached this near to it, m: as far ahead as the paper's controller aims.
-pub const GOAL_M: f64 = 5.0;
+/// When a drive is over.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Rules {
+    /// The goal is reached this near to it, m.
+    pub goal_m: f64,
+    /// Time limit: the route at this speed, km/h, and then some (NoCrash's formula).
+    pub slowest_kmph: f64,
+    pub grace_s: f64,
+    /// Further from the route than this the drive is over, m.
+    pub off_route_m: f64,
+}
 
-/// Time limit: the route at this speed, and then some (NoCrash's formula, at twice its speed).
-pub const SLOWEST_MPS: f64 = 10.0 / 3.6;
-pub const GRACE_S: f64 = 20.0;
+impl Default for Rules {
+    /// The goal lies as near as the paper's controller aims ahead, and the time limit is that of twice
+    /// NoCrash's speed.
+    fn default() -> Rules {
+        Rules { goal_m: 5.0, slowest_kmph: 10.0, grace_s: 20.0, off_route_m: 30.0 }
+    }
+}
 
-/// Further from the route than this the drive is over, m.
-pub const OFF_ROUTE_M: f64 = 30.0;
+impl Rules {
+    /// Time for a route of a length, s.
+    pub fn limit_s(&self, route_m: f64) -> f64 {
+        route_m / (self.slowest_kmph / 3.6) + self.grace_s
+    }
+}
 
 /// How a drive ended.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,15 +77,26 @@ pub struct Outcome {
 /// Looks on as somebody drives, and says when the drive is over.
 #[derive(Clone, Debug)]
 pub struct Watch {
+    rules: Rules,
     limit_s: f64,
     sums: Sums,
 }
 
 impl Watch {
     /// Of a drive that has not begun.
-    pub fn new(world: &World) -> Watch {
-        let limit_s = world.route.length_m() / SLOWEST_MPS + GRACE_S;
-        Watch { limit_s, sums: Sums::default() }
+    pub fn new(world: &World, rules: Rules) -> Watch {
+        let limit_s = rules.limit_s(world.route.length_m());
+        Watch { rules, limit_s, sums: Sums::default() }
+    }
+
+    /// What has been counted so far.
+    pub fn sums(&self) -> &Sums {
+        &self.sums
+    }
+
+    /// When time is out, s.
+    pub fn limit_s(&self) -> f64 {
+        self.limit_s
     }
 
     /// Look at the world, every 0.1 s and at the first contact; `Some` when the drive is over.
@@ -78,10 +107,11 @@ impl Watch {
             return Some(End::Contact(*contact));
         }
         let left_m = route.length_m() - progress_m;
-        if left_m < GOAL_M && ego.position_m.distance(route.goal_m()) < GOAL_M {
+        let goal_m = self.rules.goal_m;
+        if left_m < goal_m && ego.position_m.distance(route.goal_m()) < goal_m {
             return Some(End::Goal);
         }
-        if route.at(progress_m).position_m.distance(ego.position_m) > OFF_ROUTE_M {
+        if route.at(progress_m).position_m.distance(ego.position_m) > self.rules.off_route_m {
             return Some(End::OffRoute);
         }
         (world.time_s() > self.limit_s).then_some(End::Timeout)
@@ -96,7 +126,7 @@ impl Watch {
 
 /// Let a driver drive; it is asked every 0.1 s.
 pub fn drive(world: &mut World, driver: &mut dyn FnMut(&World) -> Action) -> Outcome {
-    let mut watch = Watch::new(world);
+    let mut watch = Watch::new(world, Rules::default());
     loop {
         let action = driver(world);
         for _ in 0..SUBSTEPS {

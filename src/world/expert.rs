@@ -58,6 +58,30 @@ impl Default for ExpertConfig {
     }
 }
 
+impl ExpertConfig {
+    /// The speed that the limits, bends and junctions ahead allow now, m/s.
+    pub fn wish_mps(&self, route: &Route, at_m: f64) -> f64 {
+        let mut wish = self.cruise_mps;
+        let (from, to) = (route.index_at(at_m), route.index_at(at_m + HORIZON_M));
+        for waypoint in &route.waypoints()[from..=to] {
+            let mut here = waypoint.limit_mps.min(self.cruise_mps);
+            let mut distance_m = (waypoint.at_m - at_m).max(0.0);
+            here = here.min((self.lateral_mps2 / waypoint.curvature_per_m.max(1e-6)).sqrt());
+            if waypoint.in_junction {
+                here = here.min(self.junction_mps);
+                distance_m = (distance_m - self.junction_margin_m).max(0.0);
+            }
+            wish = wish.min((here * here + 2.0 * self.foreseen_mps2 * distance_m).sqrt());
+        }
+        // The tail is still in the junction that the middle has left.
+        let behind = route.index_at(at_m - 2.5);
+        if route.waypoints()[behind..=from].iter().any(|waypoint| waypoint.in_junction) {
+            wish = wish.min(self.junction_mps);
+        }
+        wish.max(0.5)
+    }
+}
+
 /// What the expert wants, and what reaches the car.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Decision {
@@ -132,7 +156,7 @@ impl Expert {
         let (route, ego) = (&world.route, &snapshot.ego);
         let front_m = world.progress_m() + ego.config.half_length_m;
         let speed_mps = ego.speed_mps;
-        let wish_mps = self.wish_mps(route, world.progress_m());
+        let wish_mps = self.config.wish_mps(route, world.progress_m());
         let follow = &self.config.follow;
         let mut wanted = follow.acceleration_mps2(speed_mps, wish_mps, None);
         // Down to a lower wish, brake as was foreseen and not more gently.
@@ -156,29 +180,6 @@ impl Expert {
             }
         }
         wanted.max(-ego.config.brake_mps2)
-    }
-
-    /// The speed that the limits, bends and junctions ahead allow now, m/s.
-    fn wish_mps(&self, route: &Route, at_m: f64) -> f64 {
-        let config = &self.config;
-        let mut wish = config.cruise_mps;
-        let (from, to) = (route.index_at(at_m), route.index_at(at_m + HORIZON_M));
-        for waypoint in &route.waypoints()[from..=to] {
-            let mut here = waypoint.limit_mps.min(config.cruise_mps);
-            let mut distance_m = (waypoint.at_m - at_m).max(0.0);
-            here = here.min((config.lateral_mps2 / waypoint.curvature_per_m.max(1e-6)).sqrt());
-            if waypoint.in_junction {
-                here = here.min(config.junction_mps);
-                distance_m = (distance_m - config.junction_margin_m).max(0.0);
-            }
-            wish = wish.min((here * here + 2.0 * config.foreseen_mps2 * distance_m).sqrt());
-        }
-        // The tail is still in the junction that the middle has left.
-        let behind = route.index_at(at_m - 2.5);
-        if route.waypoints()[behind..=from].iter().any(|waypoint| waypoint.in_junction) {
-            wish = wish.min(config.junction_mps);
-        }
-        wish.max(0.5)
     }
 
     /// The line of a junction that others have not let us into yet.

@@ -26,6 +26,31 @@ pub enum WalkerKind {
     Child,
 }
 
+impl VehicleKind {
+    /// In a word, as logs and tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            VehicleKind::Car => "car",
+            VehicleKind::Jeep => "jeep",
+            VehicleKind::Van => "van",
+            VehicleKind::Truck => "truck",
+            VehicleKind::Bus => "bus",
+            VehicleKind::Motorcycle => "motorcycle",
+            VehicleKind::Bicycle => "bicycle",
+        }
+    }
+}
+
+impl WalkerKind {
+    /// In a word, as logs and tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            WalkerKind::Adult => "adult",
+            WalkerKind::Child => "child",
+        }
+    }
+}
+
 /// What holds for all vehicles of a kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleModel {

@@ -6,10 +6,7 @@ use crate::{
     dataset::{ego::EgoState, route::Path},
     frame::{self, Command, ROUTE_POINTS, ROUTE_SPACING_M},
     map::route::{MapRoute, RoutePoint},
-    world::{
-        ego::Car,
-        streets::{LaneId, Streets},
-    },
+    world::streets::{LaneId, Streets},
 };
 
 /// A waypoint.
@@ -139,18 +136,14 @@ impl Route {
         at_m.clamp(0.0, self.length_m())
     }
 
-    /// The local route of a car that has come `at_m` (paper, equation 1), by the code that ingest
-    /// uses for routes in logs.
-    pub fn local(&self, at_m: f64, car: &Car) -> Option<frame::Route> {
+    /// The local route of a car that has come `at_m` and believes itself to be `now` (paper, equation
+    /// 1), by the code that ingest uses for routes in logs.
+    pub fn local(&self, at_m: f64, now: &EgoState) -> Option<frame::Route> {
         const SPAN_M: f64 = ROUTE_POINTS as f64 * ROUTE_SPACING_M;
         let (from, to) = (self.index_at(at_m - BACK_M), self.index_at(at_m + BACK_M + SPAN_M));
         let near = self.waypoints[from..=to].iter();
         let points_m: Vec<DVec3> = near.map(|w| w.position_m.extend(w.height_m)).collect();
-        Path::planned(&points_m).ahead_on_route(&EgoState {
-            position_m: car.position_m.extend(self.at(at_m).height_m),
-            yaw_rad: car.yaw_rad,
-            velocity_mps: car.velocity_ego_mps().to_array(),
-        })
+        Path::planned(&points_m).ahead_on_route(now)
     }
 
     /// Distance of a place from the route at `at_m`, positive left, m.

@@ -171,6 +171,11 @@ impl World {
         &self.ego
     }
 
+    /// Put the ego vehicle somewhere else, as no action could.
+    pub fn place_ego(&mut self, ego: Car) {
+        self.ego = ego;
+    }
+
     /// Metres along the route that the ego vehicle has come.
     pub fn progress_m(&self) -> f64 {
         self.progress_m

@@ -21,7 +21,7 @@ use crate::{
 pub const LENGTHS_M: Range<f64> = 350.0..1500.0;
 
 /// What a lane change costs the planner, m.
-const LANE_CHANGE_M: f64 = 30.0;
+pub const LANE_CHANGE_M: f64 = 30.0;
 
 /// Routes that are drawn before a town counts as one without any.
 const ATTEMPTS: u64 = 64;

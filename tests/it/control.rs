@@ -149,3 +149,14 @@ fn calibration_puts_one_half_at_the_95th_percentile() {
     assert!(Fusion::calibrated(&variances[..19]).is_none());
     assert!(Fusion::calibrated(&[0.3; 100]).is_none());
 }
+
+/// `schemas/control.toml` has every key, each with its default.
+#[test]
+fn the_file_of_the_controller_says_what_holds_without_it() {
+    let text = include_str!("../../schemas/control.toml");
+    assert_eq!(toml::from_str::<ControlConfig>(text).unwrap(), ControlConfig::default());
+    let table: toml::Table = toml::from_str(text).unwrap();
+    let ours = toml::Table::try_from(ControlConfig::default()).unwrap();
+    assert_eq!(table, ours, "every key is there");
+    assert!(toml::from_str::<ControlConfig>("ahead = 5.0").is_err());
+}

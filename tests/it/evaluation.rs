@@ -27,7 +27,7 @@ use proptest::prelude::*;
 
 /// A frame of a car that goes straight on with a constant acceleration from `speed_mps`.
 pub(crate) fn accelerating(index: u32, speed_mps: f64, acceleration_mps2: f64) -> Frame {
-    let mut future = empty_future();
+    let mut future = Future::UNKNOWN;
     future.len = FUTURE_STEPS as u8;
     for i in 0..FUTURE_STEPS {
         let t = 0.1 * (i + 1) as f64;
@@ -87,15 +87,6 @@ pub(crate) fn steady(weight: f32, speed_mps: f32, yaw_rad: f32, std: Option<[f32
             speed_mps: [speed; FUTURE_STEPS],
             yaw_rad: [yaw; FUTURE_STEPS],
         }),
-    }
-}
-
-fn empty_future() -> Future {
-    Future {
-        speed_mps: [0.0; FUTURE_STEPS],
-        yaw_rad: [0.0; FUTURE_STEPS],
-        xy_m: [0.0; 2 * FUTURE_STEPS],
-        len: 0,
     }
 }
 
@@ -238,7 +229,7 @@ fn nll_is_what_a_calculator_says() {
     //   B: weight 1/4, v 0.5 1 (std 1 2), yaw 1/4 1/2 (std 1/4 1/2)
     //   p = sum(w * prod(N(v / 10, m / 10, s / 10)) * prod(N(yaw, m, s)) for A, B)
     //   -log(p) / 4 = -0.9841766566776848
-    let mut future = empty_future();
+    let mut future = Future::UNKNOWN;
     future.len = 2;
     future.speed_mps[..2].copy_from_slice(&[1.0, 2.0]);
     future.yaw_rad[..2].copy_from_slice(&[0.125, -0.25]);
@@ -429,7 +420,7 @@ fn motions() -> impl Strategy<Value = (Vec<Mode>, Future)> {
             yaw_rad: part(i + 1, 2.5),
             ..steady(weight, 0.0, 0.0, Some([2.0 * std, std]))
         };
-        let mut future = empty_future();
+        let mut future = Future::UNKNOWN;
         future.len = len;
         (future.speed_mps, future.yaw_rad) = (part(3, 4.0), part(2, 1.5));
         (vec![mode(weight, 0, std), mode(1.0 - weight, 2, 2.0 * std)], future)

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used)]
 
 use std::{
-    fs,
     path::Path,
     process::{Command, Output},
 };

@@ -42,7 +42,7 @@ mod conventions;
 mod readers;
 mod real_drive;
 mod evaluation;
-mod statistics;
+mod offline_metrics;
 mod calibration;
 mod evaluation_report;
 mod chart;
@@ -65,6 +65,10 @@ mod train_cli;
 #[cfg(feature = "learning")]
 mod run_schema;
 mod sampling;
+mod statistics;
+mod tables;
+#[cfg(feature = "learning")]
+mod tables_cli;
 mod world;
 mod encoding;
 #[cfg(feature = "learning")]
@@ -77,7 +81,10 @@ mod recording;
 mod one_pixel;
 #[cfg(feature = "learning")]
 mod operations;
+#[cfg(feature = "learning")]
+mod composed;
 mod replay;
+mod closed_loop;
 mod ranging;
 mod camera;
 mod map_fixtures;
@@ -86,5 +93,7 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "learning")]
+mod drive_cli;
 #[cfg(feature = "learning")]
 mod whole_path;

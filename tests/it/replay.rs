@@ -7,12 +7,12 @@ use foxglove::messages::PointCloud;
 use glam::{DAffine3, DVec3};
 use mcap::MessageStream;
 use pmp::{
-    dataset::ego::wrap_angle,
+    dataset::ego::{EgoState, wrap_angle},
     frame::{self, Command, Frame, RouteSource},
     sensors::radar::direction,
     sim::{
         clocks::{STEPS_PER_S, Source},
-        drive::Drive,
+        drive::Demonstration,
         reading::Reading,
         senses::Senses,
     },
@@ -39,19 +39,29 @@ pub(crate) struct Known {
     pub(crate) snapshot: Snapshot,
 }
 
-fn drive() -> Drive {
+/// Where a car is, by the words of frames.
+pub(crate) fn state_of(car: &Car, ground_m: f64) -> EgoState {
+    EgoState {
+        position_m: car.position_m.extend(ground_m),
+        yaw_rad: car.yaw_rad,
+        velocity_mps: car.velocity_ego_mps().to_array(),
+    }
+}
+
+fn drive() -> Demonstration {
     let shared = shared();
-    Drive::new(&shared.stage.town, &shared.episode, Shared::BURST_CHANCE).unwrap()
+    Demonstration::new(&shared.stage.town, &shared.episode, Shared::BURST_CHANCE).unwrap()
 }
 
 /// Every step of the shared episode.
 pub(crate) fn known() -> &'static [Known] {
     static KNOWN: OnceLock<Vec<Known>> = OnceLock::new();
     KNOWN.get_or_init(|| {
-        let mut drive = drive();
+        let mut demonstration = drive();
         let steps = (SECONDS * STEPS_PER_S as f64) as usize;
         let mut known = Vec::new();
         for _ in 0..=steps {
+            let drive = &demonstration.drive;
             let world = &drive.world;
             let waypoint = world.route.at(world.progress_m());
             known.push(Known {
@@ -61,10 +71,13 @@ pub(crate) fn known() -> &'static [Known] {
                 in_junction: waypoint.in_junction,
                 limit_mps: waypoint.limit_mps,
                 command: waypoint.command,
-                route: world.route.local(world.progress_m(), world.ego()).unwrap(),
+                route: {
+                    let now = state_of(world.ego(), world.ground_m());
+                    world.route.local(world.progress_m(), &now).unwrap()
+                },
                 snapshot: world.snapshot(),
             });
-            drive.step();
+            demonstration.step();
         }
         known
     })
@@ -193,13 +206,14 @@ fn radar_speeds_in_log_and_frames_are_the_relative_radial_speeds_of_who_was_hit(
     assert!(scans.len() >= 90);
     let rig = exact_rig();
     let mut again = drive();
-    let mut senses = Senses::new(&rig, &shared.stage, &shared.shapes, &shared.episode, &again);
+    let mut senses =
+        Senses::new(&rig, &shared.stage, &shared.shapes, &shared.episode, &again.drive);
     let mut moving = 0;
     for (step, returns) in &scans {
-        while (again.steps() as usize) < *step {
+        while (again.drive.steps() as usize) < *step {
             again.step();
         }
-        let Reading::Radar(expected) = senses.read(Source::Radar, &again) else { panic!() };
+        let Reading::Radar(expected) = senses.read(Source::Radar, &again.drive) else { panic!() };
         assert_eq!(returns.len(), expected.len(), "step {step}");
         let now = &known[*step];
         // Velocity of the radar by its place a step ago and now.

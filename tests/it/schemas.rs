@@ -10,6 +10,7 @@ use std::{
 use arrow::datatypes::{DataType, TimeUnit};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use pmp::{
+    closed_loop::{results, row::EpisodeRow},
     dataset::{
         account::{LeftOut, TopicAccount},
         columns::{self, SCHEMA_VERSION, VERSION_KEY},
@@ -21,6 +22,7 @@ use pmp::{
         split::Split,
     },
     drops::{Drops, Reason},
+    eval::table,
     frame::Conditions,
     log::{
         clock::Clock,
@@ -326,4 +328,36 @@ fn episode_columns_are_those_of_the_schema_file() {
     let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
     let listed = listed_columns(&schema_file("manifest.v1.json")["episodes.parquet"]);
     assert_eq!(written_columns(reader.schema()), listed);
+}
+
+#[test]
+fn driven_episode_columns_are_those_of_the_schema_file_and_of_a_row() {
+    let listed = listed_columns(&schema_file("episodes.v1.json")["columns"]);
+    assert_eq!(results::SCHEMA_VERSION, 1, "a new version needs a new file, episodes.v2.json");
+    let row = EpisodeRow::default();
+    let nullable: Vec<(&str, bool)> =
+        listed.iter().map(|(name, _, nullable)| (name.as_str(), *nullable)).collect();
+    // Text keeps the order of the fields, a map does not.
+    let text = serde_json::to_string(&row).unwrap();
+    let null = |pair: &str| {
+        let (name, value) = pair.split_once(':').unwrap();
+        (name.trim_matches('"').to_string(), value == "null")
+    };
+    let of_row: Vec<_> = text.trim_matches(['{', '}']).split(',').map(null).collect();
+    let of_row: Vec<(&str, bool)> = of_row.iter().map(|(n, null)| (n.as_str(), *null)).collect();
+    assert_eq!(of_row, nullable);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(results::FILE);
+    results::write(&path, &[row]).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(&path).unwrap()).unwrap();
+    assert_eq!(written_columns(reader.schema()), listed);
+    assert_eq!(reader.schema().metadata()[results::VERSION_KEY], "1");
+}
+
+#[test]
+fn a_closed_loop_table_has_the_fields_of_the_schema_file() {
+    let values = crate::tables::of_every_kind().map(|table| serde_json::to_value(table).unwrap());
+    same_fields(&values, &schema_file("table.v1.json")["fields"]);
+    assert_eq!(table::report::VERSION, 1, "a new version needs a new file, table.v2.json");
 }

@@ -22,6 +22,8 @@ use pmp::{
 };
 use proptest::prelude::*;
 
+use crate::replay::state_of;
+
 fn town(name: &str) -> Town {
     Town::choose(None, &[name.to_string()]).unwrap().swap_remove(0)
 }
@@ -112,7 +114,7 @@ fn the_local_route_lies_ahead_of_the_car_and_ends_with_the_route() {
         let yaw_rad = route.forward(at_m).to_angle();
         let aside = route.forward(at_m).perp() * -0.8;
         let car = Car::at_rest(SEDAN, spot.position_m + aside, yaw_rad);
-        let local = route.local(at_m, &car).unwrap();
+        let local = route.local(at_m, &state_of(&car, route.at(at_m).height_m)).unwrap();
         let left = ((route.length_m() - spot.at_m) / 0.4).round() as usize + 1;
         assert!(usize::from(local.len).abs_diff(left.min(130)) <= 1, "{} of {left}", local.len);
         let points: Vec<&[f32]> = local.waypoints_m.chunks(2).collect();

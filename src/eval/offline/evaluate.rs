@@ -17,7 +17,7 @@ use crate::{
         metrics::FrameErrors,
     },
     frame::{FUTURE_STEP_S, Frame, signed_speed_mps},
-    policy::{Mode, Plan, Policy},
+    policy::Policy,
 };
 
 /// A policy that is evaluated, and what is known of it.
@@ -79,7 +79,7 @@ pub fn evaluate(
                 hint,
             };
             let plan = contender.policy.plan(&frame).map_err(|e| at(e.to_string(), e.hint()))?;
-            if let Some(fault) = fault(&plan) {
+            if let Some(fault) = plan.fault() {
                 return Err(at(fault.to_string(), None));
             }
             if errors_of.branches.is_empty() {
@@ -123,33 +123,4 @@ fn unevaluated(contenders: &[Contender]) -> Result<Vec<PolicyErrors>> {
 fn driver(contender: &Contender) -> Driver {
     let fusion = contender.fusion.unwrap_or(Fusion::A2);
     Driver::new(ControlConfig::default(), fusion, FUTURE_STEP_S)
-}
-
-/// Why a plan is none, if it is none. A value that is not finite would spread into every mean,
-/// and leaving its frame out would flatter the policy.
-fn fault(plan: &Plan) -> Option<&'static str> {
-    let finite = |mode: &Mode| {
-        mode.weight.is_finite()
-            && mode.speed_mps.iter().chain(&mode.yaw_rad).all(|value| value.is_finite())
-    };
-    let positive = |mode: &Mode| {
-        mode.std.as_ref().is_none_or(|std| {
-            std.speed_mps.iter().chain(&std.yaw_rad).all(|value| value.is_normal() && *value > 0.0)
-        })
-    };
-    let action = plan.action.unwrap_or_default();
-    let weights: f32 = plan.motion.iter().map(|mode| mode.weight).sum();
-    if ![action.steer, action.throttle, action.brake].iter().all(|value| value.is_finite()) {
-        Some("planned an action that is not finite")
-    } else if !plan.motion.iter().all(finite) {
-        Some("planned a motion that is not finite")
-    } else if !plan.motion.iter().all(positive) {
-        Some("planned a standard deviation that is not positive and finite")
-    } else if plan.motion.iter().any(|mode| mode.weight < 0.0)
-        || (!plan.motion.is_empty() && (weights - 1.0).abs() > 1e-3)
-    {
-        Some("planned modes whose weights are no probabilities")
-    } else {
-        None
-    }
 }

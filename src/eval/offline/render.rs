@@ -5,9 +5,12 @@
 
 use std::fmt::Write as _;
 
-use crate::eval::offline::{
-    definitions::HEADLINE,
-    report::{Definition, Estimate, PolicyReport, Report},
+use crate::eval::{
+    offline::{
+        definitions::HEADLINE,
+        report::{Definition, Estimate, PolicyReport, Report},
+    },
+    quoting,
 };
 
 /// What a missing value looks like to people.
@@ -50,10 +53,10 @@ pub fn csv(report: &Report) -> String {
     let mut text = head.join(",") + "\n";
     for policy in &report.policies {
         let mut row = vec![
-            quoted(&report.dataset.name),
-            quoted(report.holdout.kind.text()),
+            quoting::csv(&report.dataset.name),
+            quoting::csv(report.holdout.kind.text()),
             report.holdout.weak.to_string(),
-            quoted(&policy.name),
+            quoting::csv(&policy.name),
             policy.sees_the_future.to_string(),
             report.evaluated.frames.to_string(),
         ];
@@ -74,7 +77,7 @@ pub fn csv(report: &Report) -> String {
 pub fn latex(report: &Report) -> String {
     let mut text = lines(&report.caveats, |caveat| format!("% {caveat}\n"));
     let columns = "r".repeat(report.policies.len() + 1);
-    let names = lines(&report.policies, |policy| format!(" & {}", escaped(&policy.name)));
+    let names = lines(&report.policies, |policy| format!(" & {}", quoting::latex(&policy.name)));
     let _ = writeln!(text, "\\begin{{tabular}}{{ll{columns}}}\n\\toprule");
     let _ = writeln!(text, "Metric & Unit & Frames{names} \\\\\n\\midrule");
     for metric in metrics_had(report) {
@@ -87,7 +90,7 @@ pub fn latex(report: &Report) -> String {
             format!(" & {value}{interval}")
         });
         let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
-        let (title, frames) = (escaped(&metric.title), counts(report, &metric.key));
+        let (title, frames) = (quoting::latex(&metric.title), counts(report, &metric.key));
         let _ = writeln!(text, "{title} & {unit} & {frames}{cells} \\\\");
     }
     text + "\\bottomrule\n\\end{tabular}\n"
@@ -205,26 +208,4 @@ pub fn metrics_had(report: &Report) -> Vec<&Definition> {
 
 fn lines<T>(items: &[T], line: impl Fn(&T) -> String) -> String {
     items.iter().map(line).collect()
-}
-
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_string()
-    }
-}
-
-fn escaped(text: &str) -> String {
-    let mut escaped = String::new();
-    for c in text.chars() {
-        match c {
-            '\\' => escaped += "\\textbackslash{}",
-            '~' => escaped += "\\textasciitilde{}",
-            '^' => escaped += "\\textasciicircum{}",
-            '&' | '%' | '$' | '#' | '_' | '{' | '}' => escaped.extend(['\\', c]),
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }

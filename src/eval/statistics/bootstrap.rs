@@ -10,7 +10,7 @@ use rand_chacha::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::eval::statistics::rank::quantile;
+use crate::eval::statistics::rank::selected_quantile;
 
 /// Fewest units from which a claim is made.
 ///
@@ -111,9 +111,14 @@ impl Bootstrap {
         if 2 * found.len() <= self.resamples {
             return None;
         }
-        found.sort_by(f64::total_cmp);
+        Some(self.middle(&mut found))
+    }
+
+    /// Between which two the share [`Bootstrap::level`] of some values lies, as many below as above;
+    /// changes their order.
+    pub(crate) fn middle(&self, values: &mut [f64]) -> [f64; 2] {
         let tail = (1.0 - self.level) / 2.0;
-        Some([quantile(&found, tail), quantile(&found, 1.0 - tail)])
+        [tail, 1.0 - tail].map(|share| selected_quantile(values, share))
     }
 }
 
@@ -130,8 +135,8 @@ pub fn units_with_a_value(values: &[Option<f64>], unit_of: &[u32]) -> usize {
     with_value.map(|(_, unit)| unit).collect::<std::collections::BTreeSet<_>>().len()
 }
 
-/// A number below `units`.
-fn draw(units: usize, random: &mut ChaCha8Rng) -> usize {
+/// A number below `units`, all alike.
+pub(crate) fn draw(units: usize, random: &mut ChaCha8Rng) -> usize {
     // Multiply-shift rather than a library's range: its stream may change with its version.
     ((u128::from(random.next_u64()) * units as u128) >> 64) as usize
 }

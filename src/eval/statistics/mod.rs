@@ -3,5 +3,8 @@
 pub mod mixture;
 pub mod rank;
 pub mod bootstrap;
+pub mod proportion;
+pub mod paired;
+pub mod ratio;
 
 pub use bootstrap::{Bootstrap, FEWEST_UNITS, Unit, mean, units_with_a_value};
