@@ -1,6 +1,7 @@
 //! Lines through points, with bands where the points are not certain.
 
 use crate::chart::{
+    palette::INK,
     plot::{Plot, Size},
     scale::Axis,
 };
@@ -20,9 +21,21 @@ pub struct Point {
     pub interval: Option<[f64; 2]>,
 }
 
-/// Lines over the same axes. What lies above the y-axis is left out: the line ends there.
-pub fn lines(title: &str, size: Size, x: Axis, y: Axis, lines: &[Line]) -> String {
+/// Lines over the same axes, and a dashed one at the `level` where they should be. What lies above
+/// the y-axis is left out: the line ends there.
+pub fn lines(
+    title: &str,
+    size: Size,
+    x: Axis,
+    y: Axis,
+    lines: &[Line],
+    level: Option<f64>,
+) -> String {
+    let across = [x.low, x.high];
     let mut plot = Plot::new(title, size, x, y);
+    if let Some(level) = level {
+        plot.line(&across.map(|x| [x, level]), INK, true);
+    }
     for line in lines {
         let inside: Vec<&Point> = line.points.iter().take_while(|p| plot.holds_y(p.y)).collect();
         let band: Vec<[f64; 3]> = inside

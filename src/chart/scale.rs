@@ -13,9 +13,8 @@ pub struct Axis {
 impl Axis {
     /// From 0 to the first mark that is not below `high`, or to 1 if that is not above 0.
     pub fn from_zero(label: &str, high: f64, lines: u32) -> Self {
-        let lines = lines.max(1);
-        let step =
-            round_step(if high > 0.0 { high / f64::from(lines) } else { 1.0 / f64::from(lines) });
+        let high = if high > 0.0 { high } else { 1.0 };
+        let step = round_step(high / f64::from(lines.max(1)));
         let marks = (high / step).ceil().max(1.0) as u32;
         Self::of_ticks(label, (0..=marks).map(|i| step * f64::from(i)), step)
     }

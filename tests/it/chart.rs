@@ -64,7 +64,7 @@ fn line_ends_where_it_leaves_the_axis() {
         points: vec![point(1.0, 1.0), point(2.0, 2.0), point(3.0, 9.0), point(4.0, 1.0)],
     };
     let (x, y) = (Axis::around("", 0.0, 4.0, 4), Axis::from_zero("", 4.0, 4));
-    let svg = lines("a < b", SMALL, x, y, &[line]);
+    let svg = lines("a < b", SMALL, x, y, &[line], None);
     let dots = marks(&svg, "circle", "#111111", &["cx", "cy"]);
     assert_eq!(dots.len(), 2);
     assert!(dots[0][0] < dots[1][0] && dots[0][1] > dots[1][1], "up is down in SVG: {dots:?}");

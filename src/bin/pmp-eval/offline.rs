@@ -23,8 +23,10 @@ use crate::policies;
 /// Compare plans with what the recorded driver did, on the frames held out from training
 ///
 /// `constant-velocity` and `stand-still` are always evaluated too: a number means little
-/// without them. DIR gets table.md, table.csv, table.tex, speed.svg, errors.parquet (one row
-/// per policy and frame) and report.json, written last. A report that is already there is kept.
+/// without them; a blind run (`pmp-train --model blind`) belongs beside as well. A run that is
+/// calibrated (`pmp-eval calibrate`) is judged by its fused action too. DIR gets report.html,
+/// table.md, table.csv, table.tex, speed.svg, errors.parquet (one row per policy and frame) and
+/// report.json, written last. A report that is already there is kept.
 #[derive(Args)]
 #[command(after_help = crate::AFTER)]
 pub(crate) struct Offline {

@@ -1,8 +1,11 @@
 //! What every policy got wrong at every frame: what all numbers of a report are made of.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
+    control::fusion::Fusion,
     eval::offline::{
-        metrics::FrameErrors,
+        metrics::{FrameErrors, SOURCES},
         pedals::{Pedal, brake_onsets},
         steering::{Steering, steer_way_m},
     },
@@ -39,7 +42,7 @@ pub struct FrameKey {
 }
 
 /// What a policy can see of the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sight {
     /// It learned nothing.
@@ -57,7 +60,7 @@ pub struct PolicyErrors {
     pub sees_the_future: bool,
     pub sight: Sight,
     /// Constants of eq. (3), where they are known.
-    pub fusion: Option<crate::control::fusion::Fusion>,
+    pub fusion: Option<Fusion>,
     /// Names of [`FrameErrors::attention`].
     pub branches: Vec<&'static str>,
     /// One per frame of [`Errors::frames`].
@@ -121,7 +124,7 @@ impl Errors {
                 frames.iter().map(|frame| (frame.stamp_ns - since) as f64 * 1e-9).collect();
             for policy in &mut self.policies {
                 let rows = &mut policy.rows[stretch.clone()];
-                for source in 0..crate::eval::offline::metrics::SOURCES.len() {
+                for source in 0..SOURCES.len() {
                     let pairs = || frames.iter().zip(rows.iter());
                     let rows_of = pairs().map(|(frame, errors)| Row { frame, errors });
                     let (steering, brakes): (Vec<_>, Vec<_>) =

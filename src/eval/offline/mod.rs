@@ -19,6 +19,7 @@ pub mod evaluate;
 pub mod measures;
 pub mod definitions;
 pub mod report;
+pub mod merge;
 pub mod estimate;
 pub mod slices;
 pub mod trust;

@@ -1,5 +1,7 @@
 //! What policies look through, by surroundings.
 
+use std::collections::BTreeMap;
+
 use crate::{
     chart::palette::escaped,
     eval::offline::{
@@ -18,7 +20,7 @@ pub fn attention(report: &Report) -> String {
         }
         let mut head = vec!["frames".to_string()];
         head.extend(policy.attention.keys().map(|branch| escaped(branch)));
-        let shares = |name: String, of: &std::collections::BTreeMap<String, f64>| {
+        let shares = |name: String, of: &BTreeMap<String, f64>| {
             let cell = |branch| {
                 let share = of.get(branch).copied().unwrap_or_default();
                 let width = share * 100.0;

@@ -55,7 +55,8 @@ pub fn curve(report: &Report, key: &str, top: Option<f64>) -> Option<String> {
         false => enough(report, last),
     });
     let title = format!("{}{}", definition.title, unit(&definition.unit));
+    let level = definition.better.strip_prefix("near ").and_then(|level| level.parse().ok());
     let x = Axis { low: 0.0, ..Axis::around("horizon (s)", 0.0, *report.horizons_s.last()?, 3) };
     let y = Axis::from_zero("", high, GRID_LINES);
-    (!drawn.is_empty()).then(|| lines(&title, SMALL, x, y, &drawn))
+    (!drawn.is_empty()).then(|| lines(&title, SMALL, x, y, &drawn, level))
 }

@@ -8,7 +8,7 @@ use crate::{
     },
     eval::offline::{
         html::tags::{MISSING, code, named, paragraph, row, section, table, unit},
-        plot::drivers,
+        plot::{drivers, enough},
         report::{Report, Slice},
     },
 };
@@ -34,7 +34,8 @@ pub fn slices(report: &Report) -> String {
     let Some(first) = report.policies.first() else { return String::new() };
     let mut body = paragraph(
         "Numbers without intervals: over few frames they say little. A part in which no frame was \
-         recorded is left out.",
+         recorded is left out. An axis \
+         ends at about twice the reference's highest: a bar that reaches its end goes on.",
     );
     for group in first.slices.chunk_by(|a, b| a.by == b.by) {
         let by = &group[0].by;
@@ -62,7 +63,7 @@ fn chart(report: &Report, by: &str, parts: &[&Slice], key: &str) -> Option<Strin
         parts.iter().map(|part| value(slices, by, &part.name, key)).collect()
     };
     let highest = |slices: &[Slice]| of(slices).into_iter().flatten().reduce(f64::max);
-    let enough = crate::eval::offline::plot::enough(report, |policy| highest(&policy.slices));
+    let top = enough(report, |policy| highest(&policy.slices));
     let series: Vec<Bars> = drivers(report)
         .into_iter()
         .map(|(policy, colour)| Bars { colour, values: of(&policy.slices) })
@@ -73,7 +74,7 @@ fn chart(report: &Report, by: &str, parts: &[&Slice], key: &str) -> Option<Strin
     let title = format!("{}{}", metric.title, unit(&metric.unit));
     let size =
         Size { width: (120.0 + 85.0 * groups.len() as f64).max(320.0), height: 230.0, aside: 0.0 };
-    let y = Axis::from_zero("", enough, 4);
+    let y = Axis::from_zero("", top, 4);
     (!series.is_empty()).then(|| bars(&title, size, &groups, y, &series))
 }
 
