@@ -34,6 +34,7 @@ pub mod scene;
 pub mod sensors;
 pub mod sim;
 pub mod closed_loop;
+pub mod chart;
 #[cfg(feature = "learning")]
 pub mod model;
 #[cfg(feature = "reports")]

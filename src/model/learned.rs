@@ -70,6 +70,11 @@ impl Learned {
         self.net.plans_motion()
     }
 
+    /// Whether it looks at no picture: neither the camera's nor that of lidar and radar.
+    pub fn is_blind(&self) -> bool {
+        self.size.is_none()
+    }
+
     /// Names of [`Output::attention`].
     pub fn branches(&self) -> Vec<&'static str> {
         self.net.branches()

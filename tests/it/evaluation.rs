@@ -8,9 +8,12 @@ use pmp::{
     eval::{
         baseline::{self, baseline},
         offline::{
-            definitions::{METRICS, metric},
-            evaluate::{Errors, evaluate},
-            metrics::{self, FrameErrors},
+            definitions::{CURVES, METRICS, metric},
+            errors::{Errors, Row},
+            evaluate::evaluate,
+            horizons::{WHOLE_SECONDS, wrapped_rad},
+            metrics::FrameErrors,
+            mixture_errors as mixtures,
         },
         statistics::Bootstrap,
     },
@@ -99,27 +102,37 @@ fn near(a: Option<f64>, b: f64) {
 fn constant_velocity_is_off_by_the_closed_form_when_the_car_accelerates() {
     let errors = errors_of("constant-velocity", &accelerating(0, 8.0, 2.0));
     for (i, t) in [1.0, 2.0, 3.0].into_iter().enumerate() {
-        near(errors.speed_mps[i], 2.0 * t);
-        near(errors.fde_m[i], 2.0 * t * t / 2.0);
+        let at = WHOLE_SECONDS[i];
+        near(errors.speed_mps[at], -2.0 * t);
+        near(errors.fde_m[at], 2.0 * t * t / 2.0);
         // Mean of a t^2 / 2 over t = 0.1 k, k = 1 ... n: a / 2 * 0.01 * (n + 1) (2 n + 1) / 6.
         let n = 10.0 * t;
-        near(errors.ade_m[i], 2.0 / 2.0 * 0.01 * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
+        near(errors.ade_m[at], 2.0 / 2.0 * 0.01 * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
     }
-    near(errors.heading_rad, 0.0);
-    assert_eq!(errors.min_ade_m, errors.ade_m[2], "there is only one mode");
-    assert_eq!((errors.steer, errors.nll_nats), (None, None), "it claims neither");
+    near(errors.heading_rad[5], 0.0);
+    near(errors.largest_m, 9.0);
+    assert_eq!(errors.min_ade_m, errors.ade_m[5], "there is only one mode");
+    assert_eq!(errors.min_fde_m, errors.fde_m[5], "there is only one mode");
+    assert_eq!((errors.planned[0], &errors.mixture), (None, &None), "it claims neither");
 }
 
 #[test]
 fn recorded_oracle_has_no_error_where_speed_and_yaw_say_everything() {
-    let errors = errors_of("recorded", &accelerating(0, 3.0, -0.75));
-    let numbers = [errors.steer, errors.throttle, errors.min_ade_m, errors.heading_rad];
-    for number in
-        numbers.into_iter().chain(errors.ade_m).chain(errors.fde_m).chain(errors.speed_mps)
+    let frame = accelerating(0, 3.0, -0.75);
+    let errors = errors_of("recorded", &frame);
+    for number in [errors.min_ade_m, errors.min_fde_m, errors.largest_m, errors.mean_heading_rad]
+        .into_iter()
+        .chain(errors.ade_m)
+        .chain(errors.fde_m)
+        .chain(errors.speed_mps)
     {
         near(number, 0.0);
     }
-    assert_eq!(errors.brake, None, "the log has no brake");
+    let mut frames = Errors::default();
+    frames.push_frame(0, &frame);
+    let row = Row { frame: &frames.frames[0], errors: &errors };
+    near(row.steering(0).map(|steering| steering.l1()), 0.0);
+    assert_eq!(row.brake(0), None, "the log has no brake");
     assert!(baseline("recorded").unwrap().sees_the_future());
 }
 
@@ -131,18 +144,18 @@ fn recorded_oracle_keeps_the_displacement_that_speed_and_yaw_cannot_say() {
         frame.future.xy_m[2 * i + 1] = 0.02 * (i + 1) as f32;
     }
     let errors = errors_of("recorded", &frame);
-    near(errors.fde_m[2], 0.6);
-    near(errors.ade_m[2], 0.31);
-    near(errors.speed_mps[2], 0.0);
+    near(errors.fde_m[5], 0.6);
+    near(errors.ade_m[5], 0.31);
+    near(errors.speed_mps[5], 0.0);
 }
 
 #[test]
 fn standing_still_is_off_by_the_way_driven() {
     let errors = errors_of("stand-still", &accelerating(0, 10.0, 0.0));
     // The first step still rolls out the speed of now by the trapezium rule: 10 / 2 * 0.1 m.
-    near(errors.fde_m[2], 30.0 - 0.5);
-    near(errors.speed_mps[0], 10.0);
-    near(errors.steer, 0.25);
+    near(errors.fde_m[5], 30.0 - 0.5);
+    near(errors.speed_mps[1], -10.0);
+    assert_eq!(errors.planned[0], Some(Action { steer: 0.0, throttle: 0.0, brake: 1.0 }));
 }
 
 #[test]
@@ -163,23 +176,25 @@ fn reversing_keeps_its_sign() {
     let backwards = |x: f32| -x;
     frame.future.xy_m = frame.future.xy_m.map(backwards);
     let errors = errors_of("constant-velocity", &frame);
-    near(errors.fde_m[2], 0.0);
-    near(errors.speed_mps[2], 0.0);
+    near(errors.fde_m[5], 0.0);
+    near(errors.speed_mps[5], 0.0);
 }
 
 #[test]
 fn horizon_counts_only_frames_that_reach_it() {
-    for (len, reached) in [(9, 0), (10, 1), (19, 1), (20, 2), (29, 2), (30, 3)] {
+    for (len, reached) in [(4, 0), (5, 1), (9, 1), (10, 2), (20, 4), (29, 5), (30, 6)] {
         let mut frame = accelerating(0, 5.0, 1.0);
         frame.future.len = len;
         let plan =
             Plan { motion: vec![steady(1.0, 5.0, 0.0, Some([1.0, 0.1]))], ..Plan::default() };
         let errors = FrameErrors::of(&plan, &frame);
-        let some = |values: [Option<f64>; 3]| values.iter().flatten().count();
+        let some = |values: [Option<f64>; 6]| values.iter().flatten().count();
         assert_eq!(some(errors.speed_mps), reached, "{len} steps");
         assert_eq!((some(errors.ade_m), some(errors.fde_m)), (reached, reached), "{len} steps");
-        let whole = [errors.min_ade_m, errors.heading_rad, errors.nll_nats, errors.inside[0]];
-        assert_eq!(whole.iter().flatten().count(), if reached == 3 { 4 } else { 0 });
+        assert_eq!(some(errors.heading_rad), reached, "{len} steps");
+        let whole = [errors.min_ade_m, errors.min_fde_m, errors.largest_m, errors.mean_heading_rad];
+        assert_eq!(whole.iter().flatten().count(), if reached == 6 { 4 } else { 0 });
+        assert_eq!(errors.mixture.is_some(), reached == 6);
     }
 }
 
@@ -188,7 +203,9 @@ fn heading_error_goes_the_short_way_round() {
     let mut frame = accelerating(0, 5.0, 0.0);
     frame.future.yaw_rad = [3.0; FUTURE_STEPS];
     let plan = Plan { motion: vec![steady(1.0, 5.0, -3.0, None)], ..Plan::default() };
-    near(FrameErrors::of(&plan, &frame).heading_rad, TAU - 6.0);
+    let errors = FrameErrors::of(&plan, &frame);
+    near(errors.heading_rad[5], TAU - 6.0);
+    near(errors.mean_heading_rad, TAU - 6.0);
 }
 
 #[test]
@@ -196,8 +213,12 @@ fn strongest_mode_counts_but_for_min_ade() {
     let frame = accelerating(0, 5.0, 0.0);
     let motion = vec![steady(0.25, 5.0, 0.0, None), steady(0.75, 7.0, 0.0, None)];
     let errors = FrameErrors::of(&Plan { motion, ..Plan::default() }, &frame);
-    near(errors.speed_mps[2], 2.0);
+    near(errors.speed_mps[5], 2.0);
     near(errors.min_ade_m, 0.0);
+    near(errors.min_fde_m, 0.0);
+    near(errors.min_largest_m, 0.0);
+    // 2 m/s too fast, of which the first step has half.
+    near(errors.largest_m, 2.0 * 3.0 - 0.1);
 }
 
 #[test]
@@ -223,7 +244,7 @@ fn nll_is_what_a_calculator_says() {
     };
     set(&mut a, [[1.25, 2.5], [0.0, -0.125], [0.5, 1.0], [0.125, 0.25]]);
     set(&mut b, [[0.5, 1.0], [0.25, 0.5], [1.0, 2.0], [0.25, 0.5]]);
-    let nll = metrics::nll_nats(&[a, b], &future).unwrap();
+    let nll = mixtures::nll_nats(&[a, b], &future).unwrap();
     assert!((nll + 0.984_176_656_677_684_8).abs() < 1e-12, "{nll}");
 }
 
@@ -231,7 +252,7 @@ fn nll_is_what_a_calculator_says() {
 fn nll_survives_modes_whose_density_is_zero_in_floating_point() {
     let frame = accelerating(0, 10.0, 0.0);
     let far = |speed| steady(0.5, speed, 0.0, Some([0.1, 0.01]));
-    let nll = metrics::nll_nats(&[far(30.0), far(50.0)], &frame.future).unwrap();
+    let nll = mixtures::nll_nats(&[far(30.0), far(50.0)], &frame.future).unwrap();
     // Only the nearer one counts: 200 standard deviations at 30 steps, and the log of its weight.
     let expected =
         (30.0 * (200.0f64.powi(2) / 2.0 + TAU.ln() + 2.0 * 0.01f64.ln()) - 0.5f64.ln()) / 60.0;
@@ -242,9 +263,10 @@ fn nll_survives_modes_whose_density_is_zero_in_floating_point() {
 fn mixture_metrics_need_deviations_of_every_mode() {
     let frame = accelerating(0, 10.0, 0.0);
     let modes = [steady(0.5, 9.0, 0.0, Some([1.0, 0.1])), steady(0.5, 9.0, 0.0, None)];
-    assert_eq!(metrics::nll_nats(&modes, &frame.future), None);
-    assert_eq!(metrics::inside(&modes, &frame.future, 0.5), None);
-    assert_eq!(metrics::nll_nats(&[], &frame.future), None);
+    assert_eq!(mixtures::nll_nats(&modes, &frame.future), None);
+    assert_eq!(mixtures::pit(&modes, &frame.future), None);
+    assert_eq!(mixtures::MixtureErrors::of(&modes, &frame.future), None);
+    assert_eq!(mixtures::nll_nats(&[], &frame.future), None);
 }
 
 #[test]
@@ -254,7 +276,8 @@ fn central_intervals_end_at_the_normal_quantiles() {
         for (offset, expected) in [(quantile - 1e-3, 1.0), (quantile + 1e-3, 0.5)] {
             let frame = accelerating(0, 10.0, 0.0);
             let mode = steady(1.0, 10.0 + 2.0 * offset as f32, 0.0, Some([2.0, 0.1]));
-            assert_eq!(metrics::inside(&[mode], &frame.future, share), Some(expected));
+            let pits = mixtures::pit(&[mode], &frame.future).unwrap();
+            assert_eq!(mixtures::inside(&pits, share), expected);
         }
     }
 }
@@ -270,7 +293,8 @@ fn plan_that_is_not_finite_stops_the_evaluation_and_is_named() {
         let plan = Plan { motion: vec![mode], ..Plan::default() };
         let policy = Constant { name: "run".to_string(), plan };
         let frames = vec![Ok(("town-3".to_string(), accelerating(17, 5.0, 0.0)))];
-        let error = evaluate(&mut [Box::new(policy)], frames).unwrap_err().to_string();
+        let policy: Box<dyn Policy> = Box::new(policy);
+        let error = evaluate(&mut [policy.into()], frames).unwrap_err().to_string();
         assert!(error.contains("`run`, episode town-3, frame 17"), "{error}");
         assert!(error.contains(what), "{error}");
     }
@@ -278,7 +302,7 @@ fn plan_that_is_not_finite_stops_the_evaluation_and_is_named() {
 
 #[test]
 fn two_policies_of_one_name_are_refused() {
-    let mut policies = [baseline("stand-still").unwrap(), baseline("stand-still").unwrap()];
+    let mut policies = ["stand-still"; 2].map(|name| baseline(name).unwrap().into());
     let error = evaluate(&mut policies, Vec::new()).unwrap_err();
     assert!(error.to_string().contains("`stand-still`"), "{error}");
 }
@@ -311,8 +335,9 @@ fn policy_is_reset_at_the_first_frame_of_every_episode() {
     };
     let order = [("a", 0), ("a", 1), ("a", 2), ("b", 0), ("b", 1)];
     let Errors { episodes, policies, .. } =
-        evaluate(&mut [Box::new(Counting(9))], order.map(item)).unwrap();
-    let steps: Vec<_> = policies[0].rows.iter().map(|row| row.steer.unwrap()).collect();
+        evaluate(&mut [(Box::new(Counting(9)) as Box<dyn Policy>).into()], order.map(item))
+            .unwrap();
+    let steps: Vec<_> = policies[0].rows.iter().map(|row| row.planned[0].unwrap().steer).collect();
     assert_eq!(steps, [1.0, 2.0, 3.0, 1.0, 2.0]);
     assert_eq!(episodes, ["a", "b"]);
 }
@@ -321,6 +346,8 @@ fn policy_is_reset_at_the_first_frame_of_every_episode() {
 fn metric_keys_are_unique_and_root_mean_squares_have_a_mean_beside_them() {
     let keys: std::collections::BTreeSet<_> = METRICS.iter().map(|m| m.key).collect();
     assert_eq!(keys.len(), METRICS.len());
+    let curves: std::collections::BTreeSet<_> = CURVES.iter().map(|curve| curve.key).collect();
+    assert_eq!(curves.len(), CURVES.len());
     for key in keys.iter().filter(|key| key.contains("rmse")) {
         assert!(metric(&key.replace("rmse", "mae")).is_some(), "{key}");
     }
@@ -403,7 +430,7 @@ fn motions() -> impl Strategy<Value = (Vec<Mode>, Future)> {
 proptest! {
     #[test]
     fn wrapped_angle_is_the_same_direction_within_half_a_turn(angle in -50.0f64..50.0) {
-        let wrapped = metrics::wrapped_rad(angle);
+        let wrapped = wrapped_rad(angle);
         prop_assert!(-PI < wrapped && wrapped <= PI);
         prop_assert!((wrapped.sin() - angle.sin()).abs() < 1e-9);
         prop_assert!((wrapped.cos() - angle.cos()).abs() < 1e-9);
@@ -430,7 +457,7 @@ proptest! {
             sum += product;
         }
         let slow = -sum.ln() / f64::from(2 * u32::from(future.len));
-        let nll = metrics::nll_nats(&modes, &future).unwrap();
+        let nll = mixtures::nll_nats(&modes, &future).unwrap();
         prop_assert!((nll - slow).abs() < 1e-9, "{nll} {slow}");
     }
 
@@ -446,9 +473,8 @@ proptest! {
             FrameErrors::of(&plan, &frame(future.clone())),
             FrameErrors::of(&plan, &frame(other.clone()))
         );
-        prop_assert_eq!(metrics::nll_nats(&modes, &future), metrics::nll_nats(&modes, &other));
-        let inside = |future: &Future| metrics::inside(&modes, future, 0.8);
-        prop_assert_eq!(inside(&future), inside(&other));
+        prop_assert_eq!(mixtures::nll_nats(&modes, &future), mixtures::nll_nats(&modes, &other));
+        prop_assert_eq!(mixtures::pit(&modes, &future), mixtures::pit(&modes, &other));
     }
 
     #[test]
@@ -456,9 +482,18 @@ proptest! {
         future.len = FUTURE_STEPS as u8;
         let frame = Frame { future, ..accelerating(0, 5.0, 0.0) };
         let errors = FrameErrors::of(&Plan { motion: modes, ..Plan::default() }, &frame);
-        let [half, most, nearly_all] = errors.inside.map(Option::unwrap);
+        let mixture = errors.mixture.unwrap();
+        let [half, most, nearly_all] = mixture.inside;
         prop_assert!(half <= most && most <= nearly_all);
-        prop_assert!(errors.min_ade_m.unwrap() <= errors.ade_m[2].unwrap());
+        for [half, most, nearly_all] in mixture.width_at {
+            for i in 0..half.len() {
+                prop_assert!(0.0 < half[i] && half[i] < most[i] && most[i] < nearly_all[i]);
+            }
+        }
+        prop_assert!(errors.min_ade_m.unwrap() <= errors.ade_m[5].unwrap());
+        prop_assert!(errors.min_fde_m.unwrap() <= errors.fde_m[5].unwrap());
+        prop_assert!(errors.min_largest_m.unwrap() <= errors.largest_m.unwrap());
+        prop_assert!(errors.fde_m[5].unwrap() <= errors.largest_m.unwrap());
     }
 
     #[test]

@@ -5,29 +5,30 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     path::Path,
-    process::{Command, Output},
 };
 
 use parquet::{
     file::reader::{FileReader as _, SerializedFileReader},
-    record::RowAccessor as _,
+    record::{Row, RowAccessor as _},
 };
 use pmp::{
+    control::fusion::Fusion,
     error::Result,
     eval::{
         baseline::baseline,
         offline::{
-            definitions::METRICS,
-            evaluate::{Errors, evaluate},
+            definitions::{CURVES, METRICS},
+            errors::{Errors, Sight},
+            evaluate::{Contender, evaluate},
             plot, render,
-            report::{Dataset, Holdout, HoldoutKind, Report, Verdict},
+            report::{Dataset, Definition, Holdout, HoldoutKind, Report, Verdict},
             store,
             summary::summarise,
         },
         statistics::{Bootstrap, Unit},
     },
     frame::{Frame, signed_speed_mps},
-    policy::{Plan, Policy},
+    policy::{Action, Plan, Policy},
 };
 use serde_json::Value;
 
@@ -62,16 +63,16 @@ fn drives(episodes: u32, frames: u32) -> Vec<Result<(String, Frame)>> {
     (0..episodes).flat_map(|e| (0..frames).map(move |i| (e, i))).map(|(e, i)| frame(e, i)).collect()
 }
 
-fn errors(offset_mps: f32, episodes: u32, frames: u32) -> Errors {
-    let mut policies: Vec<Box<dyn Policy>> = vec![
+pub(crate) fn errors(offset_mps: f32, episodes: u32, frames: u32) -> Errors {
+    let policies: [Box<dyn Policy>; 3] = [
         Box::new(Offset(offset_mps)),
         baseline("constant-velocity").unwrap(),
         baseline("stand-still").unwrap(),
     ];
-    evaluate(&mut policies, drives(episodes, frames)).unwrap()
+    evaluate(&mut policies.map(Contender::from), drives(episodes, frames)).unwrap()
 }
 
-fn report_of(errors: &Errors, weak: bool) -> Report {
+pub(crate) fn report_of(errors: &Errors, weak: bool) -> Report {
     let dataset = Dataset { name: "town".into(), manifest_sha256: "ab".repeat(32) };
     let holdout = Holdout {
         kind: if weak { HoldoutKind::TimeBlock } else { HoldoutKind::Episodes },
@@ -89,7 +90,7 @@ fn report(offset_mps: f32, episodes: u32, frames: u32) -> Report {
 }
 
 fn verdict(report: &Report) -> (Verdict, &str) {
-    let paired = report.policies[0].paired.as_ref().unwrap();
+    let paired = &report.policies[0].paired[0];
     (paired.verdict, &paired.sentence)
 }
 
@@ -172,11 +173,11 @@ fn frames_that_were_not_read_are_counted_in_the_first_lines() {
 
 #[test]
 fn oracle_is_marked_and_never_said_to_beat_anything() {
-    let mut policies = [baseline("recorded").unwrap(), baseline("constant-velocity").unwrap()];
+    let mut policies = ["recorded", "constant-velocity"].map(|name| baseline(name).unwrap().into());
     let errors = evaluate(&mut policies, drives(6, 60)).unwrap();
     let report = report_of(&errors, false);
-    assert_eq!(report.policies[0].paired, None);
-    assert_eq!(report.policies[1].paired, None, "nothing to compare the reference with");
+    assert_eq!(report.policies[0].paired, []);
+    assert_eq!(report.policies[1].paired, [], "nothing to compare the reference with");
     assert_eq!(
         report.caveats,
         ["`recorded` reads what the driver did next: it is a floor, not a driver."]
@@ -193,33 +194,67 @@ fn markdown_table_shows_counts_intervals_and_dashes() {
     Evaluated: 240/240 frames of 6/6 episodes. Held out by episodes: by hash of the id.
     Intervals: 95 %, percentile bootstrap, 200 resamples of 6 episodes, seed 0.
 
+    - `run_1` beats constant-velocity on speed at 3 s: 0.771 against 1.688 m/s (difference -0.917, 95 % interval -1.000 ... -0.750, n = 60 frames in 6 episodes)
+    - `stand-still` does not beat constant-velocity on speed at 3 s, it is worse: 11.188 against 1.688 m/s (difference 9.500, 95 % interval 4.500 ... 14.000, n = 60 frames in 6 episodes)
+
+    ## Motion
+
+    | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
+    |---|---|---|---:|---:|---:|---:|
+    | minADE 3 s | m | lower | 60/240 | 0.669 [0.471, 0.942] | 0.886 [0.558, 1.182] | 15.136 [7.308, 22.182] |
+    | minFDE 3 s | m | lower | 60/240 | 0.890 [0.467, 1.450] | 2.531 [1.594, 3.375] | 30.556 [14.869, 44.675] |
+    | Miss rate 3 s | – | lower | 60/240 | 0.000 [0.000, 0.000] | 0.667 [0.167, 1.000] | 1.000 [1.000, 1.000] |
+    | minMiss rate 3 s | – | lower | 60/240 | 0.000 [0.000, 0.000] | 0.667 [0.167, 1.000] | 1.000 [1.000, 1.000] |
+    | FDE at 5 m | m | lower | 196/240, 186/240, 60/240 | 0.501 [0.302, 0.858] | 0.149 [0.065, 0.337] | 30.556 [14.869, 44.675] |
+    | ADE at 5 m | m | lower | 196/240, 186/240, 60/240 | 0.286 [0.179, 0.480] | 0.059 [0.030, 0.123] | 15.136 [7.308, 22.182] |
+    | Speed bias 1 s | m/s | near 0 | 180/240 | 0.438 [0.250, 0.646] | -0.562 [-0.750, -0.354] | -10.062 [-14.750, -4.854] |
+    | Speed bias 2 s | m/s | near 0 | 120/240 | -0.125 [-0.500, 0.292] | -1.125 [-1.500, -0.708] | -10.625 [-15.500, -5.208] |
+    | Speed bias 3 s | m/s | near 0 | 60/240 | -0.688 [-1.250, -0.062] | -1.688 [-2.250, -1.062] | -11.188 [-16.250, -5.562] |
+    | AHE 3 s | rad | lower | 60/240 | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
+    | FHE 3 s | rad | lower | 60/240 | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
+
+    ## Mixture
+
+    | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
+    |---|---|---|---:|---:|---:|---:|
+    | CRPS of speed | m/s | lower | 60/240 | 0.545 [0.525, 0.574] | – | – |
+    | CRPS of yaw | rad | lower | 60/240 | 0.023 [0.023, 0.023] | – | – |
+    | ECE of speed | – | lower | 60/240 | 0.166 [0.139, 0.194] | – | – |
+    | ECE of yaw | – | lower | 60/240 | 0.263 [0.263, 0.263] | – | – |
+    | KS of speed | – | lower | 60/240 | 0.310 [0.310, 0.367] | – | – |
+    | KS of yaw | – | lower | 60/240 | 0.500 [0.500, 0.500] | – | – |
+
+    ## Variance
+
+    | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
+    |---|---|---|---:|---:|---:|---:|
+    | Variance against error | – | higher | 196/240 | 1.000 [1.000, 1.000] | – | – |
+
+    ## Action a1: its own
+
     | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
     |---|---|---|---:|---:|---:|---:|
     | Steer L1 | – | lower | 240/240 | – | – | 0.250 [0.250, 0.250] |
     | Throttle L1 | – | lower | 240/240 | – | – | 0.500 [0.500, 0.500] |
-    | Brake L1 | – | lower | 0/240 | – | – | – |
-    | ADE 1 s | m | lower | 180/240 | 0.392 [0.356, 0.432] | 0.108 [0.068, 0.144] | 4.858 [2.318, 7.144] |
-    | ADE 2 s | m | lower | 120/240 | 0.596 [0.462, 0.746] | 0.404 [0.254, 0.538] | 9.904 [4.754, 14.538] |
-    | ADE 3 s | m | lower | 60/240 | 0.669 [0.471, 0.942] | 0.886 [0.558, 1.182] | 15.136 [7.308, 22.182] |
-    | FDE 1 s | m | lower | 180/240 | 0.669 [0.575, 0.773] | 0.281 [0.177, 0.375] | 9.306 [4.452, 13.675] |
-    | FDE 2 s | m | lower | 120/240 | 0.825 [0.450, 1.242] | 1.125 [0.708, 1.500] | 19.650 [9.483, 28.800] |
-    | FDE 3 s | m | lower | 60/240 | 0.890 [0.467, 1.450] | 2.531 [1.594, 3.375] | 30.556 [14.869, 44.675] |
-    | minADE 3 s | m | lower | 60/240 | 0.669 [0.471, 0.942] | 0.886 [0.558, 1.182] | 15.136 [7.308, 22.182] |
-    | Speed error 1 s | m/s | lower | 180/240 | 0.438 [0.250, 0.646] | 0.562 [0.354, 0.750] | 10.062 [4.854, 14.750] |
-    | Speed error 2 s | m/s | lower | 120/240 | 0.375 [0.208, 0.583] | 1.125 [0.708, 1.500] | 10.625 [5.208, 15.500] |
-    | Speed error 3 s | m/s | lower | 60/240 | 0.771 [0.354, 1.251] | 1.688 [1.062, 2.250] | 11.188 [5.562, 16.250] |
-    | Speed RMSE 1 s | m/s | lower | 180/240 | 0.487 [0.306, 0.663] | 0.602 [0.385, 0.771] | 11.390 [6.153, 15.398] |
-    | Speed RMSE 2 s | m/s | lower | 120/240 | 0.445 [0.270, 0.612] | 1.203 [0.770, 1.541] | 11.987 [6.526, 16.167] |
-    | Speed RMSE 3 s | m/s | lower | 60/240 | 0.940 [0.414, 1.358] | 1.805 [1.155, 2.312] | 12.585 [6.900, 16.936] |
-    | Heading error 3 s | rad | lower | 60/240 | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
-    | NLL per number | nats | lower | 60/240 | -1.012 [-1.019, -1.003] | – | – |
-    | Coverage of 50 % | – | near 0.5 | 60/240 | 0.989 [0.967, 1.000] | – | – |
-    | Coverage of 80 % | – | near 0.8 | 60/240 | 1.000 [1.000, 1.000] | – | – |
-    | Coverage of 95 % | – | near 0.95 | 60/240 | 1.000 [1.000, 1.000] | – | – |
+    | Steer, speed-weighted | m/s | lower | 240/240 | – | – | 2.375 [1.125, 3.500] |
+    | Steer, cumulative | m | lower | 150/240 | – | – | 3.800 [1.800, 5.600] |
+    | Steer, other class | – | lower | 240/240 | – | – | 1.000 [1.000, 1.000] |
+    | Steer, off by a tenth | – | lower | 240/240 | – | – | 1.000 [1.000, 1.000] |
+    | Throttle recall | – | higher | 240/240 | – | – | 0.000 [0.000, 0.000] |
+    | Throttle F1 | – | higher | 240/240 | – | – | 0.000 [0.000, 0.000] |
 
-    - `run_1` beats constant-velocity on speed at 3 s: 0.771 against 1.688 m/s (difference -0.917, 95 % interval -1.000 ... -0.750, n = 60 frames in 6 episodes)
-    - `stand-still` does not beat constant-velocity on speed at 3 s, it is worse: 11.188 against 1.688 m/s (difference 9.500, 95 % interval 4.500 ... 14.000, n = 60 frames in 6 episodes)
-
+    ## Action a2: of the controller that follows its plan
+    | metric | unit | better | frames | `run_1` | `constant-velocity` | `stand-still` |
+    |---|---|---|---:|---:|---:|---:|
+    | Steer L1 (a2) | – | lower | 240/240 | 0.250 [0.250, 0.250] | 0.250 [0.250, 0.250] | 0.250 [0.250, 0.250] |
+    | Throttle L1 (a2) | – | lower | 240/240 | 0.073 [0.073, 0.073] | 0.500 [0.500, 0.500] | 0.500 [0.500, 0.500] |
+    | Steer, speed-weighted (a2) | m/s | lower | 240/240 | 2.375 [1.125, 3.500] | 2.375 [1.125, 3.500] | 2.375 [1.125, 3.500] |
+    | Steer, cumulative (a2) | m | lower | 150/240 | 3.800 [1.800, 5.600] | 3.800 [1.800, 5.600] | 3.800 [1.800, 5.600] |
+    | Steer, other class (a2) | – | lower | 240/240 | 1.000 [1.000, 1.000] | 1.000 [1.000, 1.000] | 1.000 [1.000, 1.000] |
+    | Steer, off by a tenth (a2) | – | lower | 240/240 | 1.000 [1.000, 1.000] | 1.000 [1.000, 1.000] | 1.000 [1.000, 1.000] |
+    | Throttle precision (a2) | – | higher | 240/240 | 1.000 [1.000, 1.000] | – | – |
+    | Throttle recall (a2) | – | higher | 240/240 | 1.000 [1.000, 1.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
+    | Throttle F1 (a2) | – | higher | 240/240 | 1.000 [1.000, 1.000] | 0.000 [0.000, 0.000] | 0.000 [0.000, 0.000] |
     | slice | frames | ADE 3 s `run_1` | ADE 3 s `constant-velocity` | ADE 3 s `stand-still` | Speed error 3 s `run_1` | Speed error 3 s `constant-velocity` | Speed error 3 s `stand-still` |
     |---|---:|---:|---:|---:|---:|---:|---:|
     | command follow | 240/240 | 0.669 (n = 60) | 0.886 (n = 60) | 15.136 (n = 60) | 0.771 (n = 60) | 1.688 (n = 60) | 11.188 (n = 60) |
@@ -283,15 +318,15 @@ fn csv_has_one_row_a_policy_and_empty_fields_for_what_is_missing() {
 #[test]
 fn latex_escapes_names() {
     let latex = render::latex(&report(1.0, 6, 40));
-    let part: Vec<_> = latex.lines().filter(|l| !l.contains("FDE") && !l.contains("ADE")).collect();
-    insta::assert_snapshot!(part[..8].join("\n"), @r#"
+    let part: Vec<_> = latex
+        .lines()
+        .filter(|l| !l.contains("FDE") && !l.contains("ADE") && !l.contains("iss rate"))
+        .collect();
+    insta::assert_snapshot!(part[..5].join("\n"), @r#"
     \begin{tabular}{llrrrr}
     \toprule
     Metric & Unit & Frames & run\_1 & constant-velocity & stand-still \\
     \midrule
-    Steer L1 & – & 240/240 & – & – & $0.250$ {\scriptsize $[0.250, 0.250]$} \\
-    Throttle L1 & – & 240/240 & – & – & $0.500$ {\scriptsize $[0.500, 0.500]$} \\
-    Brake L1 & – & 0/240 & – & – & – \\
     Speed error 1 s & m/s & 180/240 & $0.438$ {\scriptsize $[0.250, 0.646]$} & $0.562$ {\scriptsize $[0.354, 0.750]$} & $10.062$ {\scriptsize $[4.854, 14.750]$} \\
     "#);
 }
@@ -352,7 +387,10 @@ fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {
-                let key = if METRICS.iter().any(|m| m.key == key) { "*" } else { key };
+                let is_data = METRICS.iter().any(|metric| metric.key == key)
+                    || CURVES.iter().any(|curve| curve.key == key)
+                    || path.ends_with(".attention");
+                let key = if is_data { "*" } else { key };
                 let path = if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
                 fields(value, &path, found);
             }
@@ -366,65 +404,179 @@ fn fields(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     }
 }
 
+/// Plans everything that a plan can have.
+struct Whole;
+
+impl Policy for Whole {
+    fn name(&self) -> &str {
+        "whole"
+    }
+
+    fn reset(&mut self) {}
+
+    fn plan(&mut self, frame: &Frame) -> Result<Plan> {
+        let speed_mps = signed_speed_mps(frame.velocity_mps);
+        let std = 0.5 + 0.1 * frame.index as f32;
+        Ok(Plan {
+            action: Some(Action { steer: 0.2, throttle: 0.5, brake: 0.0 }),
+            motion: vec![
+                steady(0.75, speed_mps, 0.0, Some([std, 0.1])),
+                steady(0.25, speed_mps + 1.0, 0.1, Some([2.0, 0.1])),
+            ],
+            attention: vec![("camera", 0.25), ("route", 0.75)],
+        })
+    }
+}
+
+pub(crate) fn whole() -> Errors {
+    let fusion = Some(Fusion::Variance { c1: 2.0, c2: 0.001 });
+    let whole = Contender { policy: Box::new(Whole), sight: Sight::Blind, fusion };
+    let other = Contender {
+        sight: Sight::Seeing,
+        ..Contender::from(Box::new(Offset(1.0)) as Box<dyn Policy>)
+    };
+    let mut contenders = [whole, other, Contender::from(baseline("constant-velocity").unwrap())];
+    evaluate(&mut contenders, drives(6, 60)).unwrap()
+}
+
 #[test]
 fn schema_lists_every_field_metric_and_column() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.v1.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/report.v2.json");
     let schema: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
 
-    let report = report_of(&errors(1.0, 1, 100), true);
+    let mut report = report_of(&whole(), true);
+    assert_eq!(report.policies[1].paired.len(), 2, "against the reference, and the blind one");
+    report.policies.iter_mut().for_each(|policy| policy.slices.truncate(1));
     let mut found = BTreeSet::new();
-    // Twice: the same report once with and once without optional parts.
     fields(&serde_json::to_value(&report).unwrap(), "", &mut found);
-    found.retain(|path| {
-        !["policies[].paired", "policies[].metrics.*.interval"].contains(&path.as_str())
-    });
-    found.remove("policies[].slices[].metrics.*.interval");
+    // Empty or null in one policy, and whole in another.
+    let optional = [
+        "fusion",
+        "pit",
+        "variance",
+        "variance.lambda",
+        "metrics.*.interval",
+        "curves.*[].interval",
+        "paired[].interval",
+    ];
+    found.retain(|path| !optional.iter().any(|end| *path == format!("policies[].{end}")));
     let mut listed = BTreeSet::new();
     for field in schema["fields"].as_array().unwrap() {
         assert!(field["meaning"].is_string() && field["type"].is_string(), "{field}");
         listed.insert(field["path"].as_str().unwrap().to_string());
     }
-    listed.remove("policies[].slices[].metrics.*.interval");
     assert_eq!(found, listed);
 
-    let in_code: Vec<Value> = METRICS
-        .iter()
-        .map(|m| {
-            serde_json::json!({
-                "key": m.key, "title": m.title, "unit": m.unit, "better": m.better.text(),
-                "definition": m.definition,
-            })
-        })
-        .collect();
-    assert_eq!(schema["metrics"].as_array().unwrap(), &in_code);
+    for (name, definitions) in
+        [("metrics", Definition::metrics()), ("curves", Definition::curves())]
+    {
+        assert_eq!(schema[name], serde_json::to_value(definitions).unwrap());
+    }
 
-    let directory = tempfile::tempdir().unwrap();
-    store::write(directory.path(), &report, &errors(1.0, 1, 100)).unwrap();
     let columns: Vec<&str> = schema["errors_columns"]
         .as_array()
         .unwrap()
         .iter()
         .map(|c| c["name"].as_str().unwrap())
         .collect();
+    let mut written: Vec<String> = rows(&whole())
+        .0
+        .into_iter()
+        .map(|name| match name.starts_with("attention_") {
+            true => "attention_*".to_string(),
+            false => name,
+        })
+        .collect();
+    written.dedup();
+    assert_eq!(written, columns);
+}
+
+/// Columns and rows of `errors.parquet`.
+fn rows(errors: &Errors) -> (Vec<String>, Vec<Row>) {
+    let directory = tempfile::tempdir().unwrap();
+    store::write(directory.path(), &report_of(errors, false), errors).unwrap();
     let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
     let reader = SerializedFileReader::new(file).unwrap();
-    let written = reader.metadata().file_metadata().schema_descr().columns();
-    assert_eq!(written.iter().map(|c| c.name()).collect::<Vec<_>>(), columns);
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let names = schema.root_schema().get_fields().iter().map(|f| f.name().to_string()).collect();
+    (names, reader.get_row_iter(None).unwrap().map(std::result::Result::unwrap).collect())
+}
+
+#[test]
+fn surroundings_make_slices_where_something_is_known_of_them() {
+    let frames = drives(6, 40).into_iter().enumerate().map(|(i, item)| {
+        let (episode, mut frame) = item.unwrap();
+        frame.conditions.town = Some(format!("Town0{}", 1 + i / 120));
+        frame.conditions.weather = (i >= 200).then(|| "rainy".to_string());
+        Ok((episode, frame))
+    });
+    let mut contenders = [Contender::from(baseline("constant-velocity").unwrap())];
+    let report = report_of(&evaluate(&mut contenders, frames).unwrap(), false);
+    let slices = report.policies[0].slices.iter();
+    let rest: Vec<_> = slices
+        .filter(|slice| slice.by != "command" && slice.by != "speed")
+        .map(|slice| (slice.by.as_str(), slice.name.as_str(), slice.frames))
+        .collect();
+    assert_eq!(
+        rest,
+        [
+            ("town", "Town01", 120),
+            ("town", "Town02", 120),
+            ("weather", "rainy", 40),
+            ("weather", "unknown", 200)
+        ]
+    );
+}
+
+#[test]
+fn missing_blind_policy_is_named_with_the_command_that_trains_one() {
+    let seeing = || Contender {
+        sight: Sight::Seeing,
+        ..Contender::from(Box::new(Offset(1.0)) as Box<dyn Policy>)
+    };
+    let caveats = |contenders: &mut [Contender]| {
+        report_of(&evaluate(contenders, drives(6, 40)).unwrap(), false).caveats
+    };
+    let alone = caveats(&mut [seeing()]);
+    assert!(alone[0].contains("pmp-train --data DATASET --out RUN --model blind"), "{alone:?}");
+    let blind = Contender { policy: Box::new(Whole), sight: Sight::Blind, fusion: None };
+    assert_eq!(caveats(&mut [seeing(), blind]), [] as [String; 0]);
+}
+
+#[test]
+fn attention_and_shares_of_a2_are_means_over_frames() {
+    let report = report_of(&whole(), false);
+    let policy = &report.policies[0];
+    let expected = [("camera".to_string(), 0.25), ("route".to_string(), 0.75)];
+    assert_eq!(policy.attention, expected.clone().into());
+    let follow = policy.slices.iter().find(|slice| slice.name == "follow").unwrap();
+    assert_eq!(follow.attention, expected.into());
+    let variance = policy.variance.as_ref().unwrap();
+    let lambda = variance.lambda.as_ref().unwrap();
+    assert_eq!(lambda.frames, 6 * 60);
+    assert_eq!(lambda.counts.iter().sum::<u64>(), lambda.frames);
+    // Frames whose future reaches the target, which a faster car reaches sooner.
+    assert!(variance.frames > 6 * 30 && variance.frames < 6 * 60, "{}", variance.frames);
+    assert_eq!(variance.tenths.iter().map(|tenth| tenth.frames).sum::<u64>(), variance.frames);
+    assert_eq!(variance.grid.counts.iter().flatten().sum::<u64>(), variance.frames);
+    let others = &report.policies[1];
+    assert!(others.attention.is_empty());
+    assert_eq!(others.variance.as_ref().unwrap().lambda, None, "its constants are not known");
+    let pit = policy.pit.as_ref().unwrap();
+    // Six drives, 30 frames each with a whole future, ten steps in each second.
+    for counts in pit.speed.iter().chain(&pit.yaw) {
+        assert_eq!(counts.iter().sum::<u64>(), 6 * 30 * 10);
+    }
 }
 
 #[test]
 fn table_can_be_made_again_from_the_errors_per_frame() {
     let errors = errors(1.0, 6, 40);
     let report = report_of(&errors, false);
-    let directory = tempfile::tempdir().unwrap();
-    store::write(directory.path(), &report, &errors).unwrap();
-    let file = fs::File::open(directory.path().join("errors.parquet")).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
-    let at = columns.iter().position(|column| column.name() == "speed_mae_3s").unwrap();
+    let (names, rows) = rows(&errors);
+    let at = names.iter().position(|name| name == "speed_mae_3s").unwrap();
     let mut sums: BTreeMap<String, (f64, f64, u64)> = BTreeMap::new();
-    for row in reader.get_row_iter(None).unwrap() {
-        let row = row.unwrap();
+    for row in rows {
         let (sum, squares, count) = sums.entry(row.get_string(0).unwrap().clone()).or_default();
         if let Ok(error) = row.get_double(at) {
             *sum += error;
@@ -456,7 +608,15 @@ fn existing_report_is_kept_and_no_temporary_file_is_left() {
     names.sort();
     assert_eq!(
         names,
-        ["errors.parquet", "report.json", "speed.svg", "table.csv", "table.md", "table.tex"]
+        [
+            "errors.parquet",
+            "report.html",
+            "report.json",
+            "speed.svg",
+            "table.csv",
+            "table.md",
+            "table.tex"
+        ]
     );
     let error = store::write(directory.path(), &report, &errors).unwrap_err();
     assert!(error.to_string().starts_with("a report is already here: "), "{error}");
@@ -464,91 +624,10 @@ fn existing_report_is_kept_and_no_temporary_file_is_left() {
     assert_same(&store::read(directory.path()).unwrap(), &report);
 }
 
-fn pmp_eval(arguments: &[&str], directory: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pmp-eval"));
-    command.args(arguments).current_dir(directory).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-#[test]
-fn table_merges_reports_of_the_same_frames_and_prints_to_stdout() {
-    let directory = tempfile::tempdir().unwrap();
-    let write = |name: &str, errors: &Errors| {
-        store::write(&directory.path().join(name), &report_of(errors, false), errors).unwrap();
-    };
-    write("a", &errors(1.0, 6, 40));
-    let mut renamed = errors(0.5, 6, 40);
-    renamed.policies[0].name = "run_2".to_string();
-    write("b", &renamed);
-    let output = pmp_eval(&["table", "a", "b", "--format", "csv"], directory.path());
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let csv = String::from_utf8(output.stdout).unwrap();
-    let names: Vec<_> = csv.lines().skip(1).map(|row| row.split(',').nth(3).unwrap()).collect();
-    assert_eq!(names, ["run_1", "constant-velocity", "stand-still", "run_2"]);
-    for (format, start) in [("md", "# Offline"), ("tex", "\\begin{tabular}"), ("json", "{\n")] {
-        let output = pmp_eval(&["table", "a", "--format", format], directory.path());
-        assert!(String::from_utf8(output.stdout).unwrap().starts_with(start), "{format}");
-    }
-}
-
-#[test]
-fn table_refuses_what_does_not_belong_together_and_says_which() {
-    let directory = tempfile::tempdir().unwrap();
-    let write = |name: &str, report: &Report, errors: &Errors| {
-        store::write(&directory.path().join(name), report, errors).unwrap();
-    };
-    let of = errors(1.0, 6, 40);
-    write("a", &report_of(&of, false), &of);
-    let fewer = errors(1.0, 6, 39);
-    write("frames", &report_of(&fewer, false), &fewer);
-    let mut elsewhere = report_of(&of, false);
-    elsewhere.dataset.manifest_sha256 = "cd".repeat(32);
-    write("dataset", &elsewhere, &of);
-    let retrained = errors(2.0, 6, 40);
-    write("name", &report_of(&retrained, false), &retrained);
-    for (other, what) in [
-        ("frames", "is over other frames (234 held out by episodes) than a (240 by episodes)"),
-        ("dataset", "of dataset town (cdcdcdcdcdcd) and a is of dataset town (abababababab)"),
-        ("name", "another `run_1` than in a"),
-        ("absent", "no report can be read"),
-    ] {
-        let output = pmp_eval(&["table", "a", other], directory.path());
-        assert_eq!(output.status.code(), Some(1), "{other}");
-        assert!(output.stdout.is_empty(), "{other}");
-        assert!(stderr(&output).contains(what), "{}", stderr(&output));
-        assert!(stderr(&output).contains("hint: "), "{}", stderr(&output));
-    }
-}
-
 #[test]
 fn report_of_another_version_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("report.json"), r#"{"version": 9}"#).unwrap();
     let error = store::read(directory.path()).unwrap_err().to_string();
-    assert!(error.contains("version 9, this build reads version 1"), "{error}");
-}
-
-#[test]
-fn misuse_exits_2_and_help_teaches() {
-    let here = Path::new(".");
-    let output = pmp_eval(&["offline", "--policy", "stand-still", "--out", "x"], here);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("--data"), "{}", stderr(&output));
-    let help = String::from_utf8(pmp_eval(&["offline", "--help"], here).stdout).unwrap();
-    for word in ["Examples:", "Exit codes:", "constant-velocity", "report.json"] {
-        assert!(help.contains(word), "{help}");
-    }
-}
-
-#[test]
-fn unknown_policy_fails_with_the_names_that_exist() {
-    let directory = tempfile::tempdir().unwrap();
-    let arguments = ["offline", "--policy", "constant-speed", "--data", "d", "--out", "o"];
-    let output = pmp_eval(&arguments, directory.path());
-    assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("constant-velocity"), "{}", stderr(&output));
-    assert!(!directory.path().join("o").exists(), "nothing was written");
+    assert!(error.contains("version 9, this build reads version 2"), "{error}");
 }

@@ -42,8 +42,12 @@ mod conventions;
 mod readers;
 mod real_drive;
 mod evaluation;
-#[cfg(feature = "learning")]
+mod offline_metrics;
+mod calibration;
 mod evaluation_report;
+mod chart;
+#[cfg(feature = "learning")]
+mod evaluation_cli;
 #[cfg(feature = "learning")]
 mod samples;
 #[cfg(feature = "learning")]

@@ -8,6 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use pmp::eval::offline::errors::Sight;
+
 use crate::{
     fixtures::DriveLog,
     ingest::{into, same_trees, text},
@@ -77,12 +79,26 @@ fn a_trained_run_is_evaluated_beside_the_baselines_and_its_table_printed_again()
     let done = train(&dataset, &run, &["--preset", "nano", "--steps", "20"]).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 
+    let calibrate = ["calibrate", "--policy", text(&run), "--data", text(&dataset)];
+    let said = evaluate(&calibrate);
+    assert_eq!(said.status.code(), Some(0), "{}", String::from_utf8_lossy(&said.stderr));
+    assert!(String::from_utf8(said.stdout).unwrap().starts_with("c1 = "));
+    assert_eq!(evaluate(&calibrate).status.code(), Some(1), "it is there already");
+    let fusion = pmp::eval::calibration::read(&run).unwrap().unwrap().fusion;
+
     let offline = ["offline", "--policy", text(&run), "--data", text(&dataset), "--out"];
     let done = evaluate(&[offline.as_slice(), &[text(&report)]].concat());
     let table = String::from_utf8(done.stdout).unwrap();
     assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
     assert!(table.contains("| `run` | `constant-velocity` | `stand-still` |"), "{table}");
     assert!(table.contains("Held out by episodes"), "{table}");
+
+    let read = pmp::eval::offline::store::read(&report).unwrap();
+    let policy = &read.policies[0];
+    assert_eq!((policy.sight, policy.fusion), (Sight::Blind, Some(fusion)), "nano has no pictures");
+    assert!(policy.metrics["fused_steer_l1"].value.is_some());
+    assert!(policy.variance.as_ref().unwrap().lambda.is_some());
+    assert_eq!(policy.attention.keys().collect::<Vec<_>>(), ["route", "velocity"]);
 
     let again = evaluate(&["table", text(&report)]);
     assert_eq!(String::from_utf8(again.stdout).unwrap(), table);

@@ -1,6 +1,11 @@
 //! `pmp-eval drive`: policies and a suite in, episodes and tables out.
 
-use std::{fs, path::PathBuf, sync::Mutex, thread};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Mutex,
+    thread,
+};
 
 use candle_core::Device;
 use clap::{Args, ValueEnum};
@@ -19,7 +24,7 @@ use pmp::{
     },
     control::{driver::ControlConfig, fusion::Fusion},
     error::{Error, Result},
-    eval::{baseline, table},
+    eval::{baseline, calibration, table},
     model::learned::Learned,
 };
 
@@ -243,14 +248,18 @@ fn fusion(kind: FusionKind, args: &Drive, name: &str) -> Result<Fusion> {
         (FusionKind::Fixed, ..) => Fusion::Fixed { lambda: args.lambda },
         (FusionKind::Eq3, Some(c1), Some(c2)) => Fusion::Variance { c1, c2 },
         (FusionKind::Eq3, ..) => {
-            return Err(Error::Run {
+            let calibration = calibration::read(Path::new(name))?.ok_or_else(|| Error::Run {
                 path: name.into(),
                 what: "eq. (3) has no constants for this run".into(),
                 hint: Some(format!(
                     "`pmp-eval calibrate --policy {name} --data DATASET` stores them with the run; or \
                      give --c1 and --c2, or --fusion a1"
                 )),
-            });
+            })?;
+            for warning in &calibration.warnings {
+                eprintln!("warning: {name}: {warning}");
+            }
+            calibration.fusion
         }
     })
 }

@@ -2,6 +2,7 @@
 
 mod policies;
 mod offline;
+mod calibrate;
 mod drive;
 mod table;
 
@@ -22,6 +23,7 @@ struct Args {
 enum Command {
     Offline(offline::Offline),
     Drive(drive::Drive),
+    Calibrate(calibrate::Calibrate),
     Table(table::Table),
 }
 
@@ -30,6 +32,7 @@ Examples:
   pmp-eval offline --policy runs/tiny --data data/town --out reports/tiny
   pmp-eval offline --policy runs/a runs/b recorded --data data/town --out reports/ab
   pmp-eval drive --policy runs/tiny expert --suite deeptest --quick --out drives/quick
+  pmp-eval calibrate --policy runs/tiny --data data/town
   pmp-eval table reports/tiny reports/ab --format csv > table.csv
   pmp-eval table driven/ --reference paper
 
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
     cli::main(|| match Args::parse().command {
         Command::Offline(args) => offline::run(&args),
         Command::Drive(args) => drive::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Table(args) => table::run(&args),
     })
 }

@@ -43,7 +43,7 @@ pub(crate) struct Offline {
 }
 
 /// The frames that no policy was trained on, as the report tells of them.
-fn holdout(dataset: &open::Dataset) -> Result<Holdout> {
+pub(crate) fn holdout(dataset: &open::Dataset) -> Result<Holdout> {
     if dataset.val.is_empty() {
         return Err(Error::Dataset {
             path: dataset.path.clone(),

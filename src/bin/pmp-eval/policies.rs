@@ -5,15 +5,17 @@ use std::path::Path;
 use candle_core::Device;
 use pmp::{
     error::{Error, Result},
-    eval::baseline,
+    eval::{
+        baseline, calibration,
+        offline::{errors::Sight, evaluate::Contender},
+    },
     model::learned::Learned,
-    policy::Policy,
 };
 
-/// A baseline of that name, or the policy in that run directory.
-pub(crate) fn open(name: &str) -> Result<Box<dyn Policy>> {
+/// A baseline of that name, or the policy in that run directory with its calibration.
+pub(crate) fn open(name: &str) -> Result<Contender> {
     if let Some(baseline) = baseline::baseline(name) {
-        return Ok(baseline);
+        return Ok(baseline.into());
     }
     if !Path::new(name).is_dir() {
         return Err(Error::Run {
@@ -22,5 +24,11 @@ pub(crate) fn open(name: &str) -> Result<Box<dyn Policy>> {
             hint: Some(format!("baselines are {}", baseline::NAMES.join(", "))),
         });
     }
-    Ok(Box::new(Learned::open(Path::new(name), &Device::Cpu)?))
+    let learned = Learned::open(Path::new(name), &Device::Cpu)?;
+    let calibration = calibration::read(Path::new(name))?;
+    Ok(Contender {
+        sight: if learned.is_blind() { Sight::Blind } else { Sight::Seeing },
+        policy: Box::new(learned),
+        fusion: calibration.map(|calibration| calibration.fusion),
+    })
 }

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use crate::eval::{
     offline::{
         definitions::HEADLINE,
-        report::{Estimate, PolicyReport, Report},
+        report::{Definition, Estimate, PolicyReport, Report},
     },
     quoting,
 };
@@ -25,8 +25,8 @@ pub fn markdown(report: &Report) -> String {
         format!("# Offline evaluation on {}\n", report.dataset.name),
         lines(&report.caveats, |caveat| format!("> **{caveat}**\n\n")),
         basis(report),
-        metrics_table(report),
         lines(&verdicts(report), |verdict| format!("- {verdict}\n")),
+        metrics_tables(report),
         slices_table(report),
         "What the numbers are (open loop: a small error here does not show that a policy \
          drives; closed loop does):\n"
@@ -80,7 +80,7 @@ pub fn latex(report: &Report) -> String {
     let names = lines(&report.policies, |policy| format!(" & {}", quoting::latex(&policy.name)));
     let _ = writeln!(text, "\\begin{{tabular}}{{ll{columns}}}\n\\toprule");
     let _ = writeln!(text, "Metric & Unit & Frames{names} \\\\\n\\midrule");
-    for metric in &report.metrics {
+    for metric in metrics_had(report) {
         let cells = lines(&report.policies, |policy| {
             let estimate = of(policy, &metric.key);
             let interval = estimate.interval.map_or(String::new(), |[low, high]| {
@@ -97,7 +97,7 @@ pub fn latex(report: &Report) -> String {
 }
 
 /// What was evaluated and how intervals were made, in sentences.
-fn basis(report: &Report) -> String {
+pub fn basis(report: &Report) -> String {
     let (evaluated, holdout, intervals) = (&report.evaluated, &report.holdout, &report.intervals);
     let bootstrap = &intervals.bootstrap;
     format!(
@@ -116,25 +116,30 @@ fn basis(report: &Report) -> String {
     )
 }
 
-fn metrics_table(report: &Report) -> String {
+/// A table for each group of metrics, of those that some policy has.
+fn metrics_tables(report: &Report) -> String {
     let names = lines(&report.policies, |policy| format!(" `{}` |", policy.name));
-    let mut text = format!("| metric | unit | better | frames |{names}\n|---|---|---|---:|");
-    text += &"---:|".repeat(report.policies.len());
-    text.push('\n');
-    for metric in &report.metrics {
-        let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
-        let frames = counts(report, &metric.key);
-        let cells =
-            lines(&report.policies, |policy| format!(" {} |", cell(of(policy, &metric.key))));
-        let _ =
-            writeln!(text, "| {} | {unit} | {} | {frames} |{cells}", metric.title, metric.better);
+    let head = format!("| metric | unit | better | frames |{names}\n|---|---|---|---:|");
+    let head = head + &"---:|".repeat(report.policies.len());
+    let mut text = String::new();
+    for group in metrics_had(report).chunk_by(|a, b| a.group == b.group) {
+        let _ = writeln!(text, "## {}\n\n{head}", group[0].group);
+        for metric in group {
+            let unit = if metric.unit == "1" { MISSING } else { &metric.unit };
+            let frames = counts(report, &metric.key);
+            let cells =
+                lines(&report.policies, |policy| format!(" {} |", cell(of(policy, &metric.key))));
+            let title = &metric.title;
+            let _ = writeln!(text, "| {title} | {unit} | {} | {frames} |{cells}", metric.better);
+        }
+        text.push('\n');
     }
     text
 }
 
 /// What can be said of the policies against the reference.
 fn verdicts(report: &Report) -> Vec<&str> {
-    let paired = report.policies.iter().filter_map(|policy| policy.paired.as_ref());
+    let paired = report.policies.iter().flat_map(|policy| &policy.paired);
     paired.map(|paired| paired.sentence.as_str()).collect()
 }
 
@@ -180,7 +185,8 @@ fn counts(report: &Report, key: &str) -> String {
     counts.join(", ")
 }
 
-fn of<'a>(policy: &'a PolicyReport, key: &str) -> &'a Estimate {
+/// The number of a policy; an empty one if it has none.
+pub fn of<'a>(policy: &'a PolicyReport, key: &str) -> &'a Estimate {
     const NONE: &Estimate = &Estimate { value: None, interval: None, frames: 0 };
     policy.metrics.get(key).unwrap_or(NONE)
 }
@@ -190,6 +196,14 @@ fn cell(estimate: &Estimate) -> String {
     let interval =
         estimate.interval.map_or(String::new(), |[low, high]| format!(" [{low:.3}, {high:.3}]"));
     value + &interval
+}
+
+/// The metrics that some policy has.
+pub fn metrics_had(report: &Report) -> Vec<&Definition> {
+    let has = |metric: &&Definition| {
+        report.policies.iter().any(|policy| of(policy, &metric.key).value.is_some())
+    };
+    report.metrics.iter().filter(has).collect()
 }
 
 fn lines<T>(items: &[T], line: impl Fn(&T) -> String) -> String {

@@ -1,21 +1,25 @@
 //! The report: what was evaluated, on what, and what came out, as data.
 //!
-//! It is the same whatever it is rendered to; `schemas/report.v1.json` lists its fields.
+//! It is the same whatever it is rendered to; `schemas/report.v2.json` lists its fields.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    control::fusion::Fusion,
     error::{Error, Result},
     eval::{
-        offline::definitions::METRICS,
+        offline::{
+            definitions::{CURVES, Curve, METRICS, Metric},
+            errors::Sight,
+        },
         statistics::{Bootstrap, Unit},
     },
 };
 
 /// Version of the fields below.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// An offline evaluation of several policies on the same frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +33,10 @@ pub struct Report {
     pub evaluated: Evaluated,
     pub intervals: Intervals,
     pub metrics: Vec<Definition>,
+    /// Of what is given at each horizon.
+    pub curves: Vec<Definition>,
+    /// Horizons of the curves, s.
+    pub horizons_s: Vec<f64>,
     pub policies: Vec<PolicyReport>,
 }
 
@@ -94,13 +102,15 @@ pub struct Intervals {
     pub units: u64,
 }
 
-/// A row of [`METRICS`], for readers of the JSON.
+/// A row of [`METRICS`] or [`CURVES`], for readers of the JSON.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Definition {
     pub key: String,
+    /// What it is about.
+    pub group: String,
     pub title: String,
     pub unit: String,
-    /// `lower`, or `near` and a value.
+    /// `lower`, `higher`, or `near` and a value; `none` of what is neither good nor bad.
     pub better: String,
     pub definition: String,
 }
@@ -111,13 +121,80 @@ pub struct PolicyReport {
     pub name: String,
     /// An oracle, not a driver.
     pub sees_the_future: bool,
+    pub sight: Sight,
+    /// Constants of eq. (3), where they are known.
+    pub fusion: Option<Fusion>,
     /// By metric key, all of [`METRICS`].
     pub metrics: BTreeMap<String, Estimate>,
-    /// By command, then by speed.
+    /// By key, all of [`CURVES`], one number for each horizon.
+    pub curves: BTreeMap<String, Vec<Estimate>>,
+    /// By command, speed, then by what is known of the surroundings.
     pub slices: Vec<Slice>,
-    /// Against the reference; `None` for the reference itself, an oracle, and where either
-    /// plans no motion.
-    pub paired: Option<Paired>,
+    /// Against the reference and every blind policy; none for the reference itself, an oracle, and
+    /// where either plans no motion.
+    pub paired: Vec<Paired>,
+    /// Of a policy that plans deviations.
+    pub pit: Option<Pit>,
+    /// Of a policy that plans deviations.
+    pub variance: Option<Variance>,
+    /// Mean share of each branch, of a policy that has them.
+    pub attention: BTreeMap<String, f64>,
+}
+
+/// Where what was recorded lay in what was planned: counts of the probability integral transform.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pit {
+    /// For the first, second and third second of the plan, numbers in each twentieth of [0, 1].
+    pub speed: Vec<Vec<u64>>,
+    pub yaw: Vec<Vec<u64>>,
+}
+
+/// S of eq. (3) against the displacement at the target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variance {
+    /// Frames that have both.
+    pub frames: u64,
+    pub s_median: f64,
+    pub s_q95: f64,
+    /// Frames by S in ten parts of one size, the most certain first.
+    pub tenths: Vec<Tenth>,
+    pub grid: Grid,
+    /// Where the constants of eq. (3) are known.
+    pub lambda: Option<Lambda>,
+}
+
+/// A tenth of the frames, by their S.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tenth {
+    pub frames: u64,
+    /// Median of S.
+    pub s: f64,
+    /// Displacement at the target, m.
+    pub median_m: f64,
+    pub q90_m: f64,
+}
+
+/// Frames by S and error, both as their logarithms to base 10.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// From the least to the greatest, without the outermost hundredths, which count into the
+    /// border cells.
+    pub log10_s: [f64; 2],
+    pub log10_error_m: [f64; 2],
+    /// Frames in each cell: rows of ascending error, each of ascending S.
+    pub counts: Vec<Vec<u64>>,
+}
+
+/// The share of a2 in the fused action.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lambda {
+    pub frames: u64,
+    pub mean: f64,
+    /// Share of frames where it is above 0.99, and below 0.5.
+    pub above_099: f64,
+    pub below_05: f64,
+    /// Frames in each tenth of [0, 1].
+    pub counts: Vec<u64>,
 }
 
 /// One number.
@@ -134,13 +211,16 @@ pub struct Estimate {
 /// The same numbers over some of the frames, without intervals.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slice {
-    /// `command` or `speed`.
+    /// `command`, `speed`, `town`, `weather`, `illumination` or `traffic`.
     pub by: String,
-    /// A command, or the range of |speed| in m/s.
+    /// A command, the range of |speed| in m/s, or what the surroundings are called.
     pub name: String,
     /// Frames in it.
     pub frames: u64,
+    /// Those that a frame of it has.
     pub metrics: BTreeMap<String, Estimate>,
+    /// Mean share of each branch, of a policy that has them.
+    pub attention: BTreeMap<String, f64>,
 }
 
 /// Two policies frame by frame, on the headline metric.
@@ -180,15 +260,29 @@ pub enum Verdict {
 
 impl Definition {
     /// All of [`METRICS`].
-    pub fn all() -> Vec<Definition> {
-        let of = |metric: &crate::eval::offline::definitions::Metric| Definition {
+    pub fn metrics() -> Vec<Definition> {
+        let of = |metric: &Metric| Definition {
             key: metric.key.to_string(),
+            group: metric.group.to_string(),
             title: metric.title.to_string(),
             unit: metric.unit.to_string(),
             better: metric.better.text(),
             definition: metric.definition.to_string(),
         };
         METRICS.iter().map(of).collect()
+    }
+
+    /// All of [`CURVES`].
+    pub fn curves() -> Vec<Definition> {
+        let of = |curve: &Curve| Definition {
+            key: curve.key.to_string(),
+            group: "horizon".to_string(),
+            title: curve.title.to_string(),
+            unit: curve.unit.to_string(),
+            better: curve.better.map_or("none".to_string(), |better| better.text()),
+            definition: curve.definition.to_string(),
+        };
+        CURVES.iter().map(of).collect()
     }
 }
 
@@ -238,7 +332,10 @@ impl Report {
                     "one table holds one set of frames: evaluate the policies again, together",
                 );
             }
-            if report.intervals != merged.intervals || report.metrics != merged.metrics {
+            if report.intervals != merged.intervals
+                || report.metrics != merged.metrics
+                || report.curves != merged.curves
+            {
                 return refuse(
                     format!("other metrics or intervals than in {}", first.display()),
                     "evaluate the policies again with one version of pmp-eval",

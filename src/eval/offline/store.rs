@@ -1,26 +1,15 @@
-//! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `errors.parquet`, and
-//! `report.json` last, whose presence means that the directory is whole.
+//! A report on disk: `table.md`, `table.csv`, `table.tex`, `speed.svg`, `report.html`,
+//! `errors.parquet`, and `report.json` last, whose presence means that the directory is whole.
 
-use std::{fs, path::Path, sync::Arc};
-
-use arrow::{
-    array::{
-        ArrayRef, Float32Array, Float64Array, Int64Array, RecordBatch, StringArray, UInt32Array,
-    },
-    datatypes::{DataType, Field, Schema},
-};
-use parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
+use std::{fs, path::Path};
 
 use crate::{
-    atomic::{self, AtomicFile},
+    atomic,
     error::{Error, Result},
     eval::offline::{
-        definitions::{Aggregate, METRICS, Metric},
-        evaluate::{Errors, PolicyErrors},
+        errors::Errors,
+        errors_parquet,
+        html::page::page,
         plot, render,
         report::{Dataset, Report, VERSION},
     },
@@ -69,12 +58,13 @@ pub fn refuse_existing(directory: &Path) -> Result<()> {
 /// [`Error::Parquet`] or [`Error::Json`] if a file cannot be written.
 pub fn write(directory: &Path, report: &Report, errors: &Errors) -> Result<()> {
     refuse_existing(directory)?;
-    write_errors(&directory.join("errors.parquet"), errors)?;
+    errors_parquet::write(&directory.join("errors.parquet"), errors)?;
     let texts = [
         ("table.md", render::markdown(report)),
         ("table.csv", render::csv(report)),
         ("table.tex", render::latex(report)),
         ("speed.svg", plot::speed_errors(report)),
+        ("report.html", page(report)),
         ("report.json", json(report)?),
     ];
     for (name, text) in texts {
@@ -118,48 +108,4 @@ pub fn read(directory: &Path) -> Result<Report> {
         return Err(refuse(what, "evaluate the policies again with this build"));
     }
     serde_json::from_value(value).map_err(Error::json(&path))
-}
-
-/// One row per policy, episode and frame; one column per metric that is a mean, in its unit, null
-/// where the frame does not count. Exact, so that every table can be made again from it.
-fn write_errors(path: &Path, errors: &Errors) -> Result<()> {
-    let per_frame: Vec<&Metric> =
-        METRICS.iter().filter(|metric| metric.aggregate == Aggregate::Mean).collect();
-    let mut fields = vec![
-        Field::new("policy", DataType::Utf8, false),
-        Field::new("episode", DataType::Utf8, false),
-        Field::new("frame", DataType::UInt32, false),
-        Field::new("stamp_ns", DataType::Int64, false),
-        Field::new("command", DataType::Utf8, false),
-        Field::new("speed_mps", DataType::Float32, false),
-    ];
-    fields.extend(per_frame.iter().map(|m| Field::new(m.key, DataType::Float64, true)));
-    let schema = Arc::new(Schema::new(fields));
-    let level = ZstdLevel::try_new(3).map_err(Error::parquet(path))?;
-    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();
-
-    let batch = |policy: &PolicyErrors| {
-        let frames = &errors.frames;
-        let episode = |i: u32| errors.episodes[i as usize].as_str();
-        let mut columns: Vec<ArrayRef> = vec![
-            Arc::new(StringArray::from_iter_values(frames.iter().map(|_| policy.name.as_str()))),
-            Arc::new(StringArray::from_iter_values(frames.iter().map(|f| episode(f.episode)))),
-            Arc::new(UInt32Array::from_iter_values(frames.iter().map(|f| f.frame))),
-            Arc::new(Int64Array::from_iter_values(frames.iter().map(|f| f.stamp_ns))),
-            Arc::new(StringArray::from_iter_values(frames.iter().map(|f| f.command.name()))),
-            Arc::new(Float32Array::from_iter_values(frames.iter().map(|f| f.speed_mps))),
-        ];
-        for metric in &per_frame {
-            columns.push(Arc::new(policy.rows.iter().map(metric.of).collect::<Float64Array>()));
-        }
-        RecordBatch::try_new(schema.clone(), columns).map_err(Error::arrow(path))
-    };
-    let file = AtomicFile::create(path)?;
-    let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
-        .map_err(Error::parquet(path))?;
-    for policy in &errors.policies {
-        writer.write(&batch(policy)?).map_err(Error::parquet(path))?;
-    }
-    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
-    Ok(())
 }

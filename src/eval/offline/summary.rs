@@ -5,26 +5,23 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 
-use crate::{
-    eval::{
-        baseline::REFERENCE,
-        offline::{
-            definitions::{Aggregate, HEADLINE, METRICS, Metric, metric},
-            evaluate::{Errors, FrameKey, PolicyErrors},
-            metrics::FrameErrors,
-            report::{
-                Dataset, Definition, Estimate, Evaluated, Holdout, Intervals, Paired, PolicyReport,
-                Report, Slice, VERSION, Verdict,
-            },
+use crate::eval::{
+    baseline::REFERENCE,
+    offline::{
+        definitions::{CURVES, METRICS},
+        errors::{Errors, FrameKey, PolicyErrors, Row, Sight},
+        estimate::{Resampling, estimate, of_means},
+        horizons::{HORIZONS, horizons_s},
+        report::{
+            Dataset, Definition, Estimate, Evaluated, Holdout, Intervals, PolicyReport, Report,
+            VERSION,
         },
-        statistics::{Bootstrap, FEWEST_UNITS, Unit, mean, units_with_a_value},
+        slices::{attention, slices},
+        trust,
+        verdict::paired,
     },
-    frame::Command,
+    statistics::{Bootstrap, FEWEST_UNITS, Unit},
 };
-
-/// Bounds of the slices by |speed|, m/s: 0-5, 5-10, 10-15, 15+.
-const SPEED_BINS_MPS: [(&str, f32, f32); 4] =
-    [("0-5", 0.0, 5.0), ("5-10", 5.0, 10.0), ("10-15", 10.0, 15.0), ("15+", 15.0, f32::INFINITY)];
 
 /// Length of a block of frames, ns: the 3 s over which neighbouring frames share their future.
 const BLOCK_NS: i64 = 3_000_000_000;
@@ -39,18 +36,44 @@ pub fn summarise(
     let (unit, unit_of) = units(errors);
     let count = unit_of.iter().max().map_or(0, |&last| u64::from(last) + 1);
     let intervals = Intervals { bootstrap, unit, units: count };
-    let reference = errors.policies.iter().find(|policy| policy.name == REFERENCE);
+    let resampling = Resampling { bootstrap: &bootstrap, unit_of: &unit_of };
+    let references: Vec<&PolicyErrors> = errors
+        .policies
+        .iter()
+        .filter(|policy| policy.name == REFERENCE || policy.sight == Sight::Blind)
+        .collect();
     let of_policy = |policy: &PolicyErrors| {
-        let compared = reference.filter(|r| r.name != policy.name && !policy.sees_the_future);
+        let rows: Vec<Row> = errors
+            .frames
+            .iter()
+            .zip(&policy.rows)
+            .map(|(frame, errors)| Row { frame, errors })
+            .collect();
+        let compared = references.iter().filter(|reference| {
+            let learned = policy.sight != Sight::Baseline;
+            let is_itself = reference.name == policy.name || policy.name == REFERENCE;
+            !is_itself && !policy.sees_the_future && (reference.name == REFERENCE || learned)
+        });
         PolicyReport {
             name: policy.name.clone(),
             sees_the_future: policy.sees_the_future,
+            sight: policy.sight,
+            fusion: policy.fusion,
             metrics: METRICS
                 .par_iter()
-                .map(|m| (m.key.to_string(), estimate(m, &policy.rows, &unit_of, &bootstrap)))
+                .map(|m| (m.key.to_string(), estimate(&m.measure, &rows, Some(resampling))))
                 .collect(),
-            slices: slices(&errors.frames, &policy.rows),
-            paired: compared.and_then(|r| paired(policy, r, &unit_of, &intervals)),
+            curves: CURVES
+                .par_iter()
+                .map(|curve| (curve.key.to_string(), by_horizon(curve.of, &rows, resampling)))
+                .collect(),
+            slices: slices(errors, policy),
+            paired: compared
+                .filter_map(|reference| paired(errors, policy, reference, &unit_of, &intervals))
+                .collect(),
+            pit: trust::pit(&rows),
+            variance: trust::variance(&rows),
+            attention: attention(&policy.branches, &rows),
         }
     };
     Report {
@@ -59,10 +82,23 @@ pub fn summarise(
         dataset,
         evaluated: evaluated(errors),
         holdout,
-        metrics: Definition::all(),
+        metrics: Definition::metrics(),
+        curves: Definition::curves(),
+        horizons_s: horizons_s().to_vec(),
         policies: errors.policies.iter().map(of_policy).collect(),
         intervals,
     }
+}
+
+/// A number at each horizon.
+fn by_horizon(
+    of: fn(&Row) -> [Option<f64>; HORIZONS],
+    rows: &[Row],
+    resampling: Resampling,
+) -> Vec<Estimate> {
+    let values: Vec<_> = rows.iter().map(of).collect();
+    let at = |i: usize| values.iter().map(|values| values[i]).collect::<Vec<_>>();
+    (0..HORIZONS).map(|i| of_means(&at(i), |mean| mean, Some(resampling))).collect()
 }
 
 /// What is resampled, and which one every frame belongs to: episodes if there are enough of them
@@ -122,6 +158,14 @@ fn caveats(holdout: &Holdout, errors: &Errors, intervals: &Intervals) -> Vec<Str
             intervals.unit.counted(intervals.units)
         ));
     }
+    let of_sight = |sight| errors.policies.iter().any(|policy| policy.sight == sight);
+    if of_sight(Sight::Seeing) && !of_sight(Sight::Blind) {
+        caveats.push(
+            "No policy beside these is blind, so what the sensors are good for cannot be told: train \
+             one with `pmp-train --data DATASET --out RUN --model blind` and evaluate it as well."
+                .to_string(),
+        );
+    }
     for policy in errors.policies.iter().filter(|policy| policy.sees_the_future) {
         caveats.push(format!(
             "`{}` reads what the driver did next: it is a floor, not a driver.",
@@ -129,127 +173,4 @@ fn caveats(holdout: &Holdout, errors: &Errors, intervals: &Intervals) -> Vec<Str
         ));
     }
     caveats
-}
-
-fn estimate(
-    metric: &Metric,
-    rows: &[FrameErrors],
-    unit_of: &[u32],
-    bootstrap: &Bootstrap,
-) -> Estimate {
-    let values = values(metric, rows.iter());
-    let interval = bootstrap.interval(&values, unit_of);
-    let interval = interval.map(|ends| ends.map(|end| finished(metric, end)));
-    Estimate { interval, ..point(metric, &values) }
-}
-
-/// What is averaged: errors or their squares. The root comes after the mean ([`finished`]); it
-/// keeps the order, so the ends of an interval may pass through it too.
-fn values<'a>(metric: &Metric, rows: impl Iterator<Item = &'a FrameErrors>) -> Vec<Option<f64>> {
-    rows.map(|row| match metric.aggregate {
-        Aggregate::Mean => (metric.of)(row),
-        Aggregate::RootMeanSquare => (metric.of)(row).map(|error| error * error),
-    })
-    .collect()
-}
-
-fn finished(metric: &Metric, mean: f64) -> f64 {
-    match metric.aggregate {
-        Aggregate::Mean => mean,
-        Aggregate::RootMeanSquare => mean.sqrt(),
-    }
-}
-
-fn point(metric: &Metric, values: &[Option<f64>]) -> Estimate {
-    let (mean, frames) = mean(values);
-    Estimate { value: mean.map(|mean| finished(metric, mean)), interval: None, frames }
-}
-
-fn slices(frames: &[FrameKey], rows: &[FrameErrors]) -> Vec<Slice> {
-    let slice = |by: &str, name: &str, belongs: &dyn Fn(&FrameKey) -> bool| {
-        let inside = || frames.iter().zip(rows).filter(|(frame, _)| belongs(frame));
-        let of_metric = |metric: &Metric| {
-            let values = values(metric, inside().map(|(_, row)| row));
-            (metric.key.to_string(), point(metric, &values))
-        };
-        Slice {
-            by: by.to_string(),
-            name: name.to_string(),
-            frames: inside().count() as u64,
-            metrics: METRICS.iter().map(of_metric).collect(),
-        }
-    };
-    let commands = Command::ALL
-        .map(|command| slice("command", command.name(), &|frame| frame.command == command));
-    let speeds = SPEED_BINS_MPS.map(|(name, from, to)| {
-        slice("speed", name, &|frame| (from..to).contains(&frame.speed_mps.abs()))
-    });
-    commands.into_iter().chain(speeds).collect()
-}
-
-fn paired(
-    policy: &PolicyErrors,
-    reference: &PolicyErrors,
-    unit_of: &[u32],
-    intervals: &Intervals,
-) -> Option<Paired> {
-    let metric = metric(HEADLINE)?;
-    let both =
-        |pair: (&FrameErrors, &FrameErrors)| Some(((metric.of)(pair.0)?, (metric.of)(pair.1)?));
-    let pairs: Vec<_> = policy.rows.iter().zip(&reference.rows).map(both).collect();
-    let mean_of = |part: fn((f64, f64)) -> f64| {
-        mean(&pairs.iter().map(|pair| pair.map(part)).collect::<Vec<_>>()).0
-    };
-    let differences: Vec<_> = pairs.iter().map(|pair| pair.map(|(a, b)| a - b)).collect();
-    let (difference, frames) = mean(&differences);
-    let units = units_with_a_value(&differences, unit_of);
-    let interval = intervals.bootstrap.interval(&differences, unit_of);
-    let verdict = match interval {
-        _ if units < FEWEST_UNITS => Verdict::TooFew,
-        Some([_, high]) if high < 0.0 => Verdict::Beats,
-        Some([low, _]) if low > 0.0 => Verdict::Worse,
-        _ => Verdict::NoDifference,
-    };
-    let mut paired = Paired {
-        reference: reference.name.clone(),
-        metric: metric.key.to_string(),
-        frames,
-        units: units as u64,
-        policy: mean_of(|pair| pair.0)?,
-        of_reference: mean_of(|pair| pair.1)?,
-        difference: difference?,
-        interval,
-        verdict,
-        sentence: String::new(),
-    };
-    paired.sentence = sentence(&policy.name, &paired, intervals);
-    Some(paired)
-}
-
-/// The verdict in words, with the numbers it rests on.
-fn sentence(name: &str, paired: &Paired, intervals: &Intervals) -> String {
-    let Paired { reference, frames, policy, of_reference, difference, .. } = paired;
-    let on = "on speed at 3 s";
-    let percent = intervals.bootstrap.level * 100.0;
-    let interval = paired.interval.map_or("no interval".to_string(), |[low, high]| {
-        format!("{percent:.0} % interval {low:.3} ... {high:.3}")
-    });
-    let units = intervals.unit.counted(paired.units);
-    let numbers = format!(
-        "{policy:.3} against {of_reference:.3} m/s (difference {difference:.3}, {interval}, \
-         n = {frames} frames in {units})"
-    );
-    match paired.verdict {
-        Verdict::Beats => format!("`{name}` beats {reference} {on}: {numbers}"),
-        Verdict::Worse => {
-            format!("`{name}` does not beat {reference} {on}, it is worse: {numbers}")
-        }
-        Verdict::NoDifference => {
-            format!("no difference can be claimed between `{name}` and {reference} {on}: {numbers}")
-        }
-        Verdict::TooFew => format!(
-            "no difference can be claimed between `{name}` and {reference} {on}, \
-             too few for a claim: {numbers}"
-        ),
-    }
 }

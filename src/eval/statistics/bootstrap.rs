@@ -75,15 +75,48 @@ impl Bootstrap {
             }
         }
         sums.retain(|&(_, count)| count > 0);
-        if sums.len() < 2 {
+        self.interval_of(sums.len(), |drawn| {
+            let (mut total, mut count) = (0.0, 0u64);
+            for &unit in drawn {
+                let (sum, n) = sums[unit];
+                total += sum;
+                count += u64::from(n);
+            }
+            Some(total / count as f64)
+        })
+    }
+
+    /// Interval of anything that can be computed of units that are drawn, given by their numbers
+    /// below `units`, with replacement.
+    ///
+    /// Resamples of which it cannot be computed are left out; `None` if that is half of them or
+    /// more, or with fewer than two units.
+    pub fn interval_of(
+        &self,
+        units: usize,
+        statistic: impl Fn(&[usize]) -> Option<f64>,
+    ) -> Option<[f64; 2]> {
+        if units < 2 {
             return None;
         }
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut means: Vec<f64> =
-            (0..self.resamples).map(|_| resampled_mean(&sums, &mut random)).collect();
-        means.sort_by(f64::total_cmp);
+        let mut drawn = vec![0; units];
+        let mut found: Vec<f64> = Vec::with_capacity(self.resamples);
+        for _ in 0..self.resamples {
+            drawn.fill_with(|| draw(units, &mut random));
+            found.extend(statistic(&drawn));
+        }
+        if 2 * found.len() <= self.resamples {
+            return None;
+        }
+        Some(self.middle(&mut found))
+    }
+
+    /// Between which two the share [`Bootstrap::level`] of some values lies, the same number
+    /// below as above; changes their order.
+    pub(crate) fn middle(&self, values: &mut [f64]) -> [f64; 2] {
         let tail = (1.0 - self.level) / 2.0;
-        Some([quantile(&means, tail), quantile(&means, 1.0 - tail)])
+        [selected(values, tail), selected(values, 1.0 - tail)]
     }
 }
 
@@ -100,25 +133,20 @@ pub fn units_with_a_value(values: &[Option<f64>], unit_of: &[u32]) -> usize {
     with_value.map(|(_, unit)| unit).collect::<std::collections::BTreeSet<_>>().len()
 }
 
-fn resampled_mean(sums: &[(f64, u32)], random: &mut ChaCha8Rng) -> f64 {
-    let (mut total, mut count) = (0.0, 0u64);
-    for _ in 0..sums.len() {
-        let (sum, n) = sums[draw(sums.len(), random)];
-        total += sum;
-        count += u64::from(n);
-    }
-    total / count as f64
-}
-
-/// A number below `units`.
+/// A number below `units`, all alike.
 pub(crate) fn draw(units: usize, random: &mut ChaCha8Rng) -> usize {
     // Multiply-shift rather than a library's range: its stream may change with its version.
     ((u128::from(random.next_u64()) * units as u128) >> 64) as usize
 }
 
-/// Linear between the two nearest of ascending values.
-fn quantile(ascending: &[f64], share: f64) -> f64 {
-    let at = share * (ascending.len() - 1) as f64;
-    let (low, high) = (ascending[at.floor() as usize], ascending[at.ceil() as usize]);
-    low + (high - low) * at.fract()
+/// The value below which that share of the values lies, linear between the two nearest, as
+/// [`quantile`](crate::eval::statistics::rank::quantile) of sorted ones; changes their order. Sorting
+/// the resamples of every metric would take most of the time of a table.
+fn selected(values: &mut [f64], share: f64) -> f64 {
+    let at = share * (values.len() - 1) as f64;
+    let (_, &mut low, above) = values.select_nth_unstable_by(at as usize, f64::total_cmp);
+    match above.iter().copied().min_by(f64::total_cmp) {
+        Some(high) if at.fract() > 0.0 => low + (high - low) * at.fract(),
+        _ => low,
+    }
 }

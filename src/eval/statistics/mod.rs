@@ -1,5 +1,7 @@
 //! How far a number can be trusted, and whether two go together.
 
+pub mod mixture;
+pub mod rank;
 pub mod bootstrap;
 pub mod proportion;
 pub mod paired;

@@ -84,29 +84,13 @@ impl Bootstrap {
                 }
             }
         }
-        resampled.iter_mut().map(|found| self.middle(found)).collect()
-    }
-
-    /// Between which two the share [`Bootstrap::level`] of the values lies, as many below as above.
-    fn middle(&self, values: &mut [f64]) -> Option<[f64; 2]> {
-        let first = *values.first()?;
-        if values.iter().all(|value| *value == first) {
-            return None;
-        }
-        let tail = (1.0 - self.level) / 2.0;
-        let ends = [tail, 1.0 - tail].map(|share| quantile(values, share));
-        (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
-    }
-}
-
-/// Linear between the two values nearest to that share of them; changes their order. Sorting them all
-/// would take most of the time of a table.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = share * (values.len() - 1) as f64;
-    let (_, &mut low, above) = values.select_nth_unstable_by(at as usize, f64::total_cmp);
-    match above.iter().copied().min_by(f64::total_cmp) {
-        Some(high) if at.fract() > 0.0 => low + (high - low) * at.fract(),
-        _ => low,
+        let interval = |found: &mut Vec<f64>| {
+            let first = *found.first()?;
+            let alike = found.iter().all(|value| *value == first);
+            let ends = (!alike).then(|| self.middle(found))?;
+            (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
+        };
+        resampled.iter_mut().map(interval).collect()
     }
 }
 
