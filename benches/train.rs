@@ -169,7 +169,7 @@ fn main() {
     let base = peak();
 
     if mode == "gradients" {
-        let pass = Pass::Learn { seed: 0, step: 0, part: 0 };
+        let pass = Pass::Learn { seed: 0, step: 0, part: 0, activations: None };
         let grads = backward(&loss(&net.forward(&batch, &pass).unwrap(), &batch).unwrap()).unwrap();
         let of = |(name, var): (&str, &candle_core::Var)| {
             (name.to_string(), grads.get(var.as_tensor()).unwrap().clone())
@@ -179,7 +179,7 @@ fn main() {
         return candle_core::safetensors::save(&all, file).unwrap();
     }
     let mut moments: Vec<_> = match mode.as_str() {
-        "train" => weights.parameters().map(|(_, var)| Moments::zeros(var.elem_count())).collect(),
+        "train" => weights.parameters().map(|(_, var)| Moments::zeros(var).unwrap()).collect(),
         _ => vec![],
     };
     let mut step = |number: u64| {
@@ -187,7 +187,7 @@ fn main() {
             let [action, _] = policy.forward(&batch, &Pass::Judge).unwrap();
             return f64::from(action.sum_all().unwrap().to_scalar::<f32>().unwrap());
         }
-        let pass = Pass::Learn { seed: 0, step: number, part: 0 };
+        let pass = Pass::Learn { seed: 0, step: number, part: 0, activations: None };
         let loss = loss(&net.forward(&batch, &pass).unwrap(), &batch).unwrap();
         let mut grads = backward(&loss).unwrap();
         let adam = Step { number: number + 1, lr: 1e-4, ..Step::default() };

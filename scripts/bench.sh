@@ -1,7 +1,16 @@
 #!/usr/bin/env bash
-# Measure pmp-ingest beside the Python tools that do the same job: same log, same run, CPU seconds.
+# Measure pmp, each part beside others that do the same job.
 #
-#   scripts/bench.sh [--peers DIR] [--seconds N] [--rounds N]
+#   scripts/bench.sh [WHAT] [OPTIONS]      options are those of WHAT; see scripts/bench_WHAT.sh
+#
+#   ingest    pmp-ingest beside Python tools: same log, same run, CPU seconds; the default, see below
+#   train     a training step and a policy's pass beside PyTorch: CPU time, wall time, memory
+#   loader    the training's loader beside a Python one: samples per CPU second (after ingest)
+#   sensors   the simulated sensors: milliseconds by sensor, steps a second
+#   world     the traffic beside SUMO (flow, speed) and highway-env (steps a second)
+#   all       all of these, one after the other, without options
+#
+#   scripts/bench.sh ingest [--peers DIR] [--seconds N] [--rounds N]
 #
 # DIR holds the yardsticks make_bag.py (writes the log) and ingest_peer.py (does the job with the
 # PyPI packages mcap or small-mcap, libjpeg-turbo, numpy and pyarrow); ../shared/peers if not given.
@@ -9,6 +18,15 @@
 # Prints the tables of the README; all that it makes lies under target/bench/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+
+case ${1:-} in
+ingest) shift ;;
+train | loader | sensors | world) what=$1 && shift && exec "scripts/bench_$what.sh" "$@" ;;
+all)
+    [ $# -eq 1 ] || { echo "error: all takes no options; see --help" >&2; exit 2; }
+    for what in ingest train loader sensors world; do "$0" $what; done
+    exit ;;
+esac
 
 peers=../shared/peers seconds=60 rounds=5
 while [ $# -gt 0 ]; do

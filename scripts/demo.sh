@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The whole path, from a driving log to a table: record, ingest, look, train, evaluate.
+# The whole path, from a driving log to a table: record, ingest, look, train, evaluate, drive.
 #
 #   scripts/demo.sh                    on drives that pmp records itself
 #   scripts/demo.sh LOG...             on your own MCAP logs
@@ -37,7 +37,8 @@ say "build"
 cargo build --locked --bins
 bin=${CARGO_TARGET_DIR:-$PWD/target}/debug
 
-if [ ${#logs[@]} -eq 0 ]; then
+is_own_town=$([ ${#logs[@]} -eq 0 ] && echo yes || echo no)
+if [ "$is_own_town" = yes ]; then
     say "record: six drives of 40 s in towns"
     "$bin/pmp-sim" record --out "$out/logs" --episodes 6 --seconds 40 --seed 1
     logs=("$out/logs")
@@ -61,4 +62,15 @@ if [ ! -e "$out/report/report.json" ]; then
 else
     "$bin/pmp-eval" table "$out/report"
 fi
-say "the table again: $out/report/table.md; a picture of it: $out/report/speed.svg"
+say "the table again: $out/report/table.md; as a page: $out/report/report.html"
+
+# What learned from another camera than the simulator's has nothing to look for in it.
+if [ "$is_own_town" = yes ]; then
+    say "calibrate: how far the network's plans are to be followed"
+    "$bin/pmp-eval" calibrate --policy "$out/run" --data "$out/dataset" --force
+
+    say "drive: one route in each town and traffic of DeepTest, beside the expert"
+    done_or_with_loss "$bin/pmp-eval" drive --policy "$out/run" expert --episodes 1 \
+        --out "$out/driven-$steps"
+    say "the table again: $out/driven-$steps/table.md; failures: $out/driven-$steps/failures"
+fi

@@ -69,33 +69,29 @@ impl<'t> Observer<'t> {
     }
 
     /// What the sensors say now.
-    ///
-    /// # Panics
-    ///
-    /// If a sensor answers with another's reading.
     pub fn observe(&mut self, drive: &Drive) -> Observation {
-        let mut readings = Vec::new();
-        let mut read = |source| {
-            readings.push(self.senses.read(source, drive));
-            readings.last().cloned()
-        };
-        let Some(Reading::Odometry(odometry)) = read(Source::Odometry) else {
-            unreachable!("odometry answers with odometry")
-        };
-        let image = match self.wanted.camera.then(|| read(Source::Camera)).flatten() {
-            Some(Reading::Picture(jpeg)) => jpeg,
-            _ => Vec::new(),
-        };
-        let lidar = match self.wanted.ranging.then(|| read(Source::Lidar)).flatten() {
-            Some(Reading::Lidar(returns)) => Some(returns),
-            _ => None,
-        };
-        let radar = match self.wanted.ranging.then(|| read(Source::Radar)).flatten() {
-            Some(Reading::Radar(returns)) => Some(returns),
-            _ => None,
-        };
+        let sources = [
+            (Source::Odometry, true),
+            (Source::Camera, self.wanted.camera),
+            (Source::Lidar, self.wanted.ranging),
+            (Source::Radar, self.wanted.ranging),
+        ];
+        let wanted = sources.into_iter().filter(|(_, is_wanted)| *is_wanted);
+        let readings: Vec<Reading> =
+            wanted.map(|(source, _)| self.senses.read(source, drive)).collect();
         let world = &drive.world;
-        let now = state(&odometry);
+        let mut now = None;
+        let (mut image, mut lidar, mut radar) = (Vec::new(), None, None);
+        for reading in &readings {
+            match reading {
+                Reading::Odometry(odometry) => now = Some(state(odometry)),
+                Reading::Picture(jpeg) => image.clone_from(jpeg),
+                Reading::Lidar(returns) => lidar = Some(self.lidar_pixels(returns)),
+                Reading::Radar(returns) => radar = Some(self.radar_pixels(returns)),
+                _ => {}
+            }
+        }
+        let now = now.unwrap_or_else(|| unreachable!("odometry answers with odometry"));
         let waypoint = world.route.at(world.progress_m());
         let stamp_ns = self.start_ns + drive.steps() as i64 * STEP_NS;
         let route = world.route.local(world.progress_m(), &now);
@@ -103,8 +99,8 @@ impl<'t> Observer<'t> {
             index: self.looked,
             stamp_ns,
             image,
-            lidar: lidar.map(|returns| self.lidar_pixels(&returns)),
-            radar: radar.map(|returns| self.radar_pixels(&returns)),
+            lidar,
+            radar,
             velocity_mps: now.velocity_mps.map(|value| value as f32),
             yaw_rad: now.yaw_rad,
             position_m: now.position_m.to_array(),

@@ -4,14 +4,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use candle_core::{Device, Tensor, Var};
+use candle_core::{Tensor, Var};
 
 use crate::{
     error::{Error, Result},
     model::{
         gradient::Gradient,
         init::Weights,
-        ops::adam::{Moments, Step, adam_step, sum_of_squares},
+        ops::adam::{Moments, Step, adam_step, sums_of_squares},
     },
 };
 
@@ -33,12 +33,16 @@ struct Slot {
 
 impl Adam {
     /// No step taken, moments 0.
-    pub fn new(weights: &Weights, weight_decay: f64) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Tensor`] if memory runs out.
+    pub fn new(weights: &Weights, weight_decay: f64) -> Result<Self> {
         let slot = |(name, var): (&str, &Var)| {
-            let moments = Moments::zeros(var.elem_count());
-            Slot { name: name.into(), var: var.clone(), moments }
+            Ok(Slot { name: name.into(), var: var.clone(), moments: Moments::zeros(var)? })
         };
-        Self { slots: weights.parameters().map(slot).collect(), steps: 0, weight_decay }
+        let slots = weights.parameters().map(slot).collect::<Result<_>>()?;
+        Ok(Self { slots, steps: 0, weight_decay })
     }
 
     /// Steps taken.
@@ -55,17 +59,15 @@ impl Adam {
     /// [`Error::Diverged`] naming the first parameter whose gradient is not finite, before
     /// anything is changed; [`Error::Tensor`] if memory runs out.
     pub fn step(&mut self, gradient: &Gradient, lr: f64, clip_norm: f64) -> Result<f64> {
-        let mut squares = 0.0;
-        for slot in &self.slots {
-            let Some(grad) = gradient.get(&slot.name) else { continue };
-            let its = sum_of_squares(grad)?;
-            if !its.is_finite() {
-                let term = format!("gradient of {}", slot.name);
-                return Err(Error::Diverged { step: self.steps + 1, term, frames: vec![] });
-            }
-            squares += its;
+        let names = self.slots.iter().map(|slot| slot.name.as_str());
+        let with_gradient = names.filter_map(|name| Some((name, gradient.get(name)?)));
+        let (names, grads): (Vec<_>, Vec<_>) = with_gradient.unzip();
+        let squares = sums_of_squares(&grads)?;
+        if let Some(i) = squares.iter().position(|squares| !squares.is_finite()) {
+            let term = format!("gradient of {}", names[i]);
+            return Err(Error::Diverged { step: self.steps + 1, term, frames: vec![] });
         }
-        let norm = squares.sqrt();
+        let norm = squares.iter().sum::<f64>().sqrt();
         let clipped = clip_norm > 0.0 && norm + 1e-6 > clip_norm;
         let grad_scale = if clipped { clip_norm / (norm + 1e-6) } else { 1.0 };
 
@@ -88,9 +90,8 @@ impl Adam {
     pub fn moments(&self) -> Result<BTreeMap<String, Tensor>> {
         let mut moments = BTreeMap::new();
         for slot in &self.slots {
-            let Moments { first, second } = &slot.moments;
-            for (which, values) in [("first", first), ("second", second)] {
-                let tensor = Tensor::from_slice(values, slot.var.shape(), &Device::Cpu)?;
+            let both = slot.moments.tensors(&slot.var)?;
+            for (which, tensor) in ["first", "second"].into_iter().zip(both) {
                 moments.insert(format!("{which}.{}", slot.name), tensor);
             }
         }
@@ -106,12 +107,11 @@ impl Adam {
         for slot in &mut self.slots {
             let moment = |which: &str| {
                 let name = format!("{which}.{}", slot.name);
-                match moments.get(&name) {
-                    Some(m) if m.dims() == slot.var.dims() => m.flatten_all()?.to_vec1::<f32>(),
-                    _ => Err(candle_core::Error::msg(format!("no moment {name} that fits"))),
-                }
+                let fits = moments.get(&name).filter(|moment| moment.dims() == slot.var.dims());
+                let none = || candle_core::Error::msg(format!("no moment {name} that fits"));
+                fits.ok_or_else(none)
             };
-            slot.moments = Moments { first: moment("first")?, second: moment("second")? };
+            slot.moments = Moments::of(&slot.var, [moment("first")?, moment("second")?])?;
         }
         self.steps = steps;
         Ok(())

@@ -1,6 +1,6 @@
 //! A batch norm with its weights and running statistics, by torchvision's names.
 
-use candle_core::{CpuStorage, InplaceOp1, Layout, Tensor};
+use candle_core::Tensor;
 use candle_nn::{
     Init, VarBuilder,
     init::{ONE, ZERO},
@@ -10,7 +10,7 @@ use pmp_kernels::norm::Moments;
 use crate::{
     error::Result,
     model::{
-        ops::{Norm, Numbers, batch_norm},
+        ops::{Norm, batch_norm, is_for_kernels, moments_of, tensors_of},
         pass::Pass,
     },
 };
@@ -54,24 +54,13 @@ impl BatchNorm {
         residual: Option<&Tensor>,
         pass: &Pass,
     ) -> Result<Tensor> {
-        let moments = if pass.learns() { None } else { Some(self.running.moments()?) };
-        let norm = Norm { moments, eps: EPS, relu: true };
-        let (out, moments) = batch_norm(x, &self.scale, &self.shift, residual, &norm)?;
-        if pass.learns() {
-            let mut running = self.running.moments()?;
-            running.follow(&moments, x.elem_count() / self.scale.elem_count(), MOMENTUM);
-            self.running.set(running)?;
-        }
-        Ok(out)
+        self.running.normalise(x, [&self.scale, &self.shift], residual, true, pass)
     }
 }
 
-/// Running mean and variance of a norm.
+/// Running mean and variance of a norm, `[C]` each.
 #[derive(Clone, Debug)]
-pub struct Running {
-    mean: Tensor,
-    variance: Tensor,
-}
+pub struct Running([Tensor; 2]);
 
 impl Running {
     /// Take `running_mean` and `running_var`, `[C]`.
@@ -82,7 +71,30 @@ impl Running {
     /// another shape.
     pub fn new(channels: usize, vb: &VarBuilder) -> Result<Self> {
         let get = |name: &str, start: Init| vb.get_with_hints(channels, name, start);
-        Ok(Self { mean: get("running_mean", ZERO)?, variance: get("running_var", ONE)? })
+        Ok(Self([get("running_mean", ZERO)?, get("running_var", ONE)?]))
+    }
+
+    /// `norm(x) + residual`, both `[.., C]`, and a ReLU if `relu`; `scale` and `shift` are `[C]`. A
+    /// pass that learns normalises by the batch and moves these towards it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Tensor`](crate::error::Error::Tensor) if shapes disagree.
+    pub fn normalise(
+        &self,
+        x: &Tensor,
+        [scale, shift]: [&Tensor; 2],
+        residual: Option<&Tensor>,
+        relu: bool,
+        pass: &Pass,
+    ) -> Result<Tensor> {
+        let moments = (!pass.learns()).then(|| self.0.clone());
+        let norm = Norm { moments, eps: EPS, relu };
+        let (out, moments) = batch_norm(x, scale, shift, residual, &norm)?;
+        if pass.learns() {
+            self.follow(&moments, x.elem_count() / scale.elem_count())?;
+        }
+        Ok(out)
     }
 
     /// What they are now.
@@ -91,36 +103,33 @@ impl Running {
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if they are not f32 on the CPU.
     pub fn moments(&self) -> Result<Moments> {
-        let numbers = Numbers::of([&self.mean, &self.variance])?;
-        Ok(numbers.read(|slices| Moments { mean: slices[0].into(), variance: slices[1].into() }))
+        moments_of(&self.0)
     }
 
     /// Write others in their place, for everyone who shares them.
     ///
     /// # Errors
     ///
-    /// [`Error::Tensor`](crate::error::Error::Tensor) if they are not f32 on the CPU.
-    pub fn set(&self, moments: Moments) -> Result<()> {
-        self.mean.inplace_op1(&Write(moments.mean))?;
-        Ok(self.variance.inplace_op1(&Write(moments.variance))?)
-    }
-}
-
-/// Writes these numbers.
-struct Write(Vec<f32>);
-
-impl InplaceOp1 for Write {
-    fn name(&self) -> &'static str {
-        "write"
-    }
-
-    fn cpu_fwd(&self, storage: &mut CpuStorage, layout: &Layout) -> candle_core::Result<()> {
-        match (storage, layout.contiguous_offsets()) {
-            (CpuStorage::F32(numbers), Some((from, to))) if to - from == self.0.len() => {
-                numbers[from..to].copy_from_slice(&self.0);
-                Ok(())
-            }
-            _ => candle_core::bail!("statistics are f32, contiguous, one for each channel"),
+    /// [`Error::Tensor`](crate::error::Error::Tensor) if they are of other sizes or devices.
+    pub fn set(&self, moments: &[Tensor; 2]) -> Result<()> {
+        for (kept, new) in self.0.iter().zip(moments) {
+            kept.slice_set(new, 0, 0)?;
         }
+        Ok(())
+    }
+
+    /// Move towards the moments of a batch of `pixels`.
+    fn follow(&self, batch: &[Tensor; 2], pixels: usize) -> Result<()> {
+        if self.0.iter().chain(batch).all(is_for_kernels) {
+            let mut running = self.moments()?;
+            running.follow(&moments_of(batch)?, pixels, MOMENTUM);
+            return self.set(&tensors_of(&running)?);
+        }
+        let unbiased = pixels as f64 / (pixels as f64 - 1.0).max(1.0);
+        let moved = |kept: &Tensor, new: &Tensor, factor: f64| {
+            (kept * (1.0 - MOMENTUM))? + (new.to_dtype(kept.dtype())? * (MOMENTUM * factor))?
+        };
+        let [mean, variance] = &self.0;
+        self.set(&[moved(mean, &batch[0], 1.0)?, moved(variance, &batch[1], unbiased)?])
     }
 }

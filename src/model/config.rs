@@ -6,15 +6,19 @@
 
 use std::path::PathBuf;
 
+use candle_core::{DType, Device};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     dataset::loader::SamplingConfig,
     error::{Error, Result},
-    model::net_config::{Model, NetConfig, Preset},
+    model::{
+        device::Place,
+        net_config::{Model, NetConfig, Preset},
+    },
 };
 
-/// A training run: the same value and the same dataset give the same weights.
+/// A training run: on the CPU the same value and the same dataset give the same weights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
@@ -66,7 +70,42 @@ pub struct TrainConfig {
     pub keep: usize,
     /// A file of ResNet34 weights to start from, `.safetensors` or `.pth`; empty for none.
     pub pretrained: PathBuf,
+    /// Where to compute; a run may be continued elsewhere.
+    #[serde(default)]
+    pub device: Place,
+    #[serde(default)]
+    pub precision: Precision,
     pub net: NetConfig,
+}
+
+/// What the encoders of the pictures, nearly all of the work, compute with while learning.
+/// Weights, moments, everything behind the encoders and validations are always f32.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    #[default]
+    F32,
+    /// Half the memory, 8 bits of precision: on a GPU.
+    Bf16,
+}
+
+impl Precision {
+    /// The type of the encoders' activations while learning; `None` for that of their pictures.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] for a type that is slower than f32 on the device.
+    pub fn on(self, device: &Device) -> Result<Option<DType>> {
+        match self {
+            Precision::F32 => Ok(None),
+            Precision::Bf16 if !device.is_cpu() => Ok(Some(DType::BF16)),
+            Precision::Bf16 => Err(Error::Config {
+                key: "precision".into(),
+                what: "bf16 is for GPUs, and this is the CPU".into(),
+                hint: Some("`precision = \"f32\"`, or a GPU by `--device cuda`".into()),
+            }),
+        }
+    }
 }
 
 /// What is minimised.
@@ -157,6 +196,8 @@ impl TrainConfig {
             save_every: 250,
             keep: 1,
             pretrained: PathBuf::new(),
+            device: Place::Auto,
+            precision: Precision::F32,
             net: NetConfig::preset(model, preset),
         };
         match preset {

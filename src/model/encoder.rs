@@ -100,8 +100,9 @@ impl Encoder {
         Ok(Self { mean, unit, layers, name, size, width })
     }
 
-    /// `[B, H, W, C]` and `[B, 1]` to `[B, width]`, all 0 or more. Where the sensor is not
-    /// present, the picture is not looked at: not even an infinity in it comes through.
+    /// `[B, H, W, C]` and `[B, 1]` to `[B, width]`, all 0 or more, of the picture's type; computed
+    /// in that of the pass. Where the sensor is not present, the picture is not looked at: not even
+    /// an infinity in it comes through.
     ///
     /// # Errors
     ///
@@ -116,13 +117,15 @@ impl Encoder {
                 present.where_cond(&scaled, &scaled.zeros_like()?)?
             }
         };
-        match &self.layers {
-            Layers::Resnet(net) => net.forward(&x, pass),
+        let x = x.to_dtype(pass.activations().unwrap_or(picture.dtype()))?;
+        let x = match &self.layers {
+            Layers::Resnet(net) => net.forward(&x, pass)?,
             Layers::Stack(layers) => {
                 let x = layers.iter().try_fold(x, |x, layer| layer.forward(&x, pass))?;
-                Ok(x.flatten_from(1)?)
+                x.flatten_from(1)?
             }
-        }
+        };
+        Ok(x.to_dtype(picture.dtype())?)
     }
 }
 

@@ -1,6 +1,6 @@
 //! One pass through a network: whether it learns, and what chance does in it.
 
-use candle_core::Tensor;
+use candle_core::{DType, Tensor};
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng as _, SeedableRng as _},
@@ -22,12 +22,22 @@ pub enum Pass {
         step: u64,
         /// Which of the step's micro-batches.
         part: u64,
+        /// Type of the encoders' activations; `None` for that of their pictures.
+        activations: Option<DType>,
     },
 }
 
 impl Pass {
     pub fn learns(&self) -> bool {
         matches!(self, Pass::Learn { .. })
+    }
+
+    /// The type of the encoders' activations; `None` for that of their pictures.
+    pub fn activations(&self) -> Option<DType> {
+        match self {
+            Pass::Judge => None,
+            Pass::Learn { activations, .. } => *activations,
+        }
     }
 
     /// Set a share of the numbers to 0 and scale up the others, so that the mean stays (Srivastava
@@ -38,7 +48,7 @@ impl Pass {
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if memory runs out.
     pub fn dropout(&self, x: &Tensor, share: f64, layer: &str) -> Result<Tensor> {
-        let &Pass::Learn { seed, step, part } = self else { return Ok(x.clone()) };
+        let &Pass::Learn { seed, step, part, .. } = self else { return Ok(x.clone()) };
         if share == 0.0 {
             return Ok(x.clone());
         }

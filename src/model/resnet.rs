@@ -1,8 +1,9 @@
 //! ResNet34 from pictures to features (He et al., 2016, arXiv:1512.03385), by torchvision's names.
 //!
-//! The whole network is one operation of candle's graph: its activations are kept and given free
-//! by `pmp_kernels`, and the gradients of its weights go around candle's sums, so a loss on it is
-//! gone back from by [`gradients::backward`].
+//! On the CPU the whole network is one operation of candle's graph: its activations are kept and
+//! given free by `pmp_kernels`, and the gradients of its weights go around candle's sums, so a loss
+//! on it is gone back from by [`gradients::backward`]. Elsewhere it is made of the operations of
+//! [`ops`](super::ops), one by one.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,7 +20,10 @@ use crate::{
         batch_norm::Running,
         describe,
         init::kaiming,
-        ops::{Numbers, gradients, with_gradient},
+        ops::{
+            Conv, Numbers, conv2d, gradients, is_for_kernels, max_pool, tensors_of, wide,
+            with_gradient,
+        },
         pass::Pass,
     },
 };
@@ -87,19 +91,22 @@ impl ResNet34 {
         self.network.layers().into_iter().zip(sizes).map(line).collect()
     }
 
-    /// `[B, H, W, C]` to `[B, 8 width]`, all 0 or more. A pass that learns normalises by the batch
+    /// `[B, H, W, C]` to `[B, 8 width]`, all 0 or more, f32 if `x` is bf16. A pass that learns normalises by the batch
     /// and moves the running statistics.
     ///
     /// # Errors
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if the picture has other channels or no
-    /// pixels, or is not f32 on the CPU.
+    /// pixels.
     pub fn forward(&self, x: &Tensor, pass: &Pass) -> Result<Tensor> {
         let (batch, height, width, channels) = x.dims4()?;
         if channels != self.network.channels || x.elem_count() == 0 {
             let what =
                 format!("{:?} for a network of {} channels", x.dims(), self.network.channels);
             return Err(candle_core::Error::msg(what).into());
+        }
+        if !is_for_kernels(x) {
+            return self.by_operations(x, pass);
         }
         let numbers = Numbers::of([x].into_iter().chain(&self.weights))?;
         let running = self.running.iter().map(Running::moments).collect::<Result<Vec<_>>>()?;
@@ -116,7 +123,7 @@ impl ResNet34 {
         });
         if pass.learns() {
             for (running, moved) in self.running.iter().zip(moved) {
-                running.set(moved)?;
+                running.set(&tensors_of(&moved)?)?;
             }
         }
         let shape = Shape::from((batch, self.network.features()));
@@ -148,6 +155,33 @@ impl ResNet34 {
         };
         // One of the weights, so that candle knows that there is something to go back for.
         with_gradient("resnet34", (features, shape), &[x, &self.weights[0]], Box::new(back))
+    }
+}
+
+impl ResNet34 {
+    /// The same, an operation after the other.
+    fn by_operations(&self, x: &Tensor, pass: &Pass) -> Result<Tensor> {
+        let layers = self.network.layers();
+        let normed = |at: usize, x: &Tensor, residual: Option<&Tensor>, relu: bool| {
+            let (layer, weights) = (&layers[at], &self.weights[3 * at..]);
+            let conv = Conv { stride: layer.stride, padding: layer.kernel / 2 };
+            let x = conv2d(x, &weights[0], None, conv)?;
+            self.running[at].normalise(&x, [&weights[1], &weights[2]], residual, relu, pass)
+        };
+        let mut x = max_pool(&normed(0, x, None, true)?, 3, Conv { stride: 2, padding: 1 })?;
+        let mut at = 1;
+        while at < layers.len() {
+            // Of a block the shortcut is the last.
+            let has_shortcut = layers.get(at + 2).is_some_and(|layer| layer.kernel == 1);
+            let shortcut = match has_shortcut {
+                true => normed(at + 2, &x, None, false)?,
+                false => x.clone(),
+            };
+            let inner = normed(at, &x, None, true)?;
+            x = normed(at + 1, &inner, Some(&shortcut), true)?;
+            at += 2 + usize::from(has_shortcut);
+        }
+        Ok(x.to_dtype(wide(x.dtype()))?.mean((1, 2))?)
     }
 }
 

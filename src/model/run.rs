@@ -124,8 +124,8 @@ impl RunDir {
     /// Start a run in a directory that does not exist or is empty, or continue one.
     ///
     /// With `resume`, a directory without a run is started, one with a run must have the same
-    /// configuration (`steps` may be more) and the same dataset; without a checkpoint it starts
-    /// from step 0.
+    /// configuration (`steps` may be more, `device` another) and the same dataset; without a
+    /// checkpoint it starts from step 0.
     ///
     /// # Errors
     ///
@@ -166,12 +166,11 @@ impl RunDir {
                 hint: Some("give the dataset it was started with, or another `--out`".into()),
             });
         }
-        let more_steps = saved.steps < config.steps;
-        if more_steps {
-            saved.steps = config.steps;
-        }
+        let changes = saved.steps < config.steps || saved.device != config.device;
+        saved.steps = saved.steps.max(config.steps);
+        saved.device = config.device;
         same(&as_read(dir, &saved)?, &as_read(dir, config)?, "")?;
-        if more_steps {
+        if changes {
             atomic::write_json(&dir.join(CONFIG), &saved)?;
         }
         let kept = manifest.as_ref().map(|m| m.checkpoints.clone()).unwrap_or_default();
@@ -402,7 +401,10 @@ fn same(saved: &Value, wanted: &Value, key: &str) -> Result<()> {
     Err(Error::Config {
         key: key.into(),
         what: format!("the run was started with {saved}, not {wanted}"),
-        hint: Some("leave it as it was (`steps` may be raised), or start a new run".into()),
+        hint: Some(
+            "leave it as it was (`steps` may be raised, `device` changed), or start a new run"
+                .into(),
+        ),
     })
 }
 

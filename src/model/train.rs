@@ -79,7 +79,7 @@ impl State {
             Optimizer::Adam => 0.0,
             Optimizer::Adamw => cfg.weight_decay,
         };
-        let adam = Adam::new(&weights, weight_decay);
+        let adam = Adam::new(&weights, weight_decay)?;
         let average = (cfg.ema > 0.0).then(|| Average::new(cfg.ema, &weights)).transpose()?;
         Ok(Self { net, weights, adam, average, progress: Progress::default() })
     }
@@ -162,9 +162,10 @@ pub fn train(
 /// The loss of a batch and its gradient, worked through in micro-batches.
 fn descend(cfg: &TrainConfig, state: &State, batch: &Batch) -> Result<(Terms, Gradient)> {
     let (step, known) = (state.adam.steps(), Known::of(&batch.targets)?);
+    let activations = cfg.precision.on(batch.targets.action.device())?;
     let (mut tally, mut gradient) = (Tally::default(), Gradient::default());
     for (part, micro) in (0..).zip(batch.split(cfg.micro_batches)?) {
-        let pass = Pass::Learn { seed: cfg.seed, step, part };
+        let pass = Pass::Learn { seed: cfg.seed, step, part, activations };
         let output = state.net.forward(&micro.inputs, &pass)?;
         let sums = LossSums::new(&output, &micro.targets, cfg.loss.assign)?;
         let its = sums.read()?;
@@ -226,11 +227,13 @@ pub fn validate(cfg: &TrainConfig, state: &State, data: &mut Data) -> Result<Val
 
 /// Train on a run directory: start it, or with `resume` continue it from its last checkpoint.
 ///
-/// The same configuration and data end in the same files, however often the run was stopped.
+/// The same configuration and data end in the same files, however often the run was stopped, on
+/// the CPU.
 ///
 /// # Errors
 ///
-/// Those of [`RunDir::open`] and [`train`]; the run then stands at its last checkpoint.
+/// [`Error::Config`] for a precision that the device is not for; those of [`RunDir::open`] and
+/// [`train`]; the run then stands at its last checkpoint.
 pub fn train_run(
     cfg: &TrainConfig,
     out: &Path,
@@ -240,6 +243,7 @@ pub fn train_run(
     on: &mut dyn FnMut(&Event) -> Result<()>,
 ) -> Result<()> {
     cfg.validate()?;
+    cfg.precision.on(device)?;
     let (mut dir, checkpoint) = RunDir::open(out, cfg, &data.identity, resume, device)?;
     let cfg = dir.config().clone();
     let mut state = State::new(&cfg, device)?;

@@ -1,7 +1,7 @@
 //! The constants of eq. (3): from which frames they come, what is said of them, and the file.
 #![allow(clippy::unwrap_used)]
 
-use std::fs;
+use std::{fs, path::Path};
 
 use pmp::{
     control::fusion::Fusion,
@@ -15,6 +15,7 @@ use pmp::{
     frame::RecordedAction,
     policy::Action,
 };
+use serde_json::Value;
 
 use crate::evaluation::accelerating;
 
@@ -117,4 +118,25 @@ fn calibration_is_kept_once_and_read_back() {
     fs::write(run.path().join(calibration::FILE), r#"{"version": 7}"#).unwrap();
     let error = calibration::read(run.path()).unwrap_err().to_string();
     assert!(error.contains("version 7, this build reads 1"), "{error}");
+}
+
+#[test]
+fn schema_lists_every_field() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fusion.v1.json");
+    let schema: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    let listed: Vec<&str> =
+        schema["fields"].as_array().unwrap().iter().map(|f| f["path"].as_str().unwrap()).collect();
+    let found = serde_json::to_value(calibrated(&errors(|i| i as f64 * 1e-3))).unwrap();
+    let mut fields = Vec::new();
+    for (key, value) in found.as_object().unwrap() {
+        match value {
+            Value::Object(parts) => fields.extend(parts.keys().map(|part| format!("{key}.{part}"))),
+            Value::Array(_) => fields.push(format!("{key}[]")),
+            _ => fields.push(key.clone()),
+        }
+    }
+    fields.sort();
+    let mut listed: Vec<String> = listed.into_iter().map(str::to_string).collect();
+    listed.sort();
+    assert_eq!(fields, listed);
 }

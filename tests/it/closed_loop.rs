@@ -260,7 +260,7 @@ fn snapshot(ego_mps: f64, others: &[(DVec2, f64, DVec2)]) -> Snapshot {
 fn state() -> VehicleState {
     let route = TOWN.route(4, 0, 350.0..1500.0).unwrap();
     let world = TOWN.world(route, Counts { vehicles: 1, walkers: 0 }, 4, 0);
-    VehicleState { ground_m: 0.0, ..world.snapshot().vehicles[0].clone() }
+    VehicleState { ground_m: 0.0, ..world.snapshot().vehicles[0] }
 }
 
 #[test]

@@ -3,8 +3,12 @@
 use std::{
     fs,
     path::Path,
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
+    thread,
+    time::Duration,
 };
+
+use pmp::closed_loop::results;
 
 use crate::ingest::text;
 
@@ -69,6 +73,66 @@ fn policies_drive_a_suite_and_the_table_can_be_printed_again() {
     let refused = drive(&other);
     assert_eq!(refused.status.code(), Some(1));
     assert!(said(&refused.stderr).contains("(policies)"), "{}", said(&refused.stderr));
+}
+
+#[test]
+fn a_drive_that_was_killed_goes_on_and_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let suite = folder.path().join("suite.toml");
+    fs::write(&suite, SUITE.replace("episodes = 2", "episodes = 8")).unwrap();
+    let (whole, killed) = (folder.path().join("whole"), folder.path().join("killed"));
+    let arguments = |out: &Path| {
+        let words =
+            ["drive", "--policy", "expert", "--jobs", "1", "--suite", text(&suite), "--out"];
+        words.iter().chain([&text(out)]).map(|word| word.to_string()).collect::<Vec<_>>()
+    };
+    let program = || Command::new(env!("CARGO_BIN_EXE_pmp-eval"));
+    let done = program().args(arguments(&whole)).output().unwrap();
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done.stderr));
+
+    let mut child =
+        program().args(arguments(&killed)).stderr(Stdio::null()).stdout(Stdio::null()).spawn();
+    let child = child.as_mut().unwrap();
+    let first = killed.join("episodes/expert/Town02-empty-00.json");
+    while !first.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be killed");
+        thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!killed.join("episodes.parquet").exists(), "it was not killed in time");
+    let done = program().args(arguments(&killed)).output().unwrap();
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done.stderr));
+    for file in ["episodes.parquet", "table.md", "drive.json"] {
+        let bytes = |out: &Path| fs::read(out.join(file)).unwrap();
+        assert!(bytes(&whole) == bytes(&killed), "{file}");
+    }
+}
+
+/// Routes that were not made by pmp, on a map that was not.
+#[test]
+fn routes_of_the_carla_leaderboard_are_driven_on_carlas_own_map() {
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/maps");
+    let routes = shared.join("routes/routes_town02_tiny.xml");
+    if !routes.exists() {
+        println!("skipped: no {}", routes.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let suite = folder.path().join("suite.toml");
+    fs::copy(&routes, folder.path().join("routes.xml")).unwrap();
+    let listed = SUITE.replace("skies =", "routes = \"routes.xml\"\nskies =");
+    fs::write(&suite, listed.replace("1e9", "10.0").replace("grace_s = 4.0", "")).unwrap();
+    let out = folder.path().join("out");
+    let arguments =
+        ["--policy", "expert", "stand-still", "--suite", text(&suite), "--out", text(&out)];
+    let done = drive(&[arguments.as_slice(), &["--maps", text(&shared)]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done.stderr));
+    let rows = results::read(&out.join(results::FILE)).unwrap();
+    let ends: Vec<_> = rows.iter().map(|row| (&*row.policy, &*row.reason)).collect();
+    let expected = [("expert", "goal"), ("stand-still", "timeout")];
+    assert_eq!(ends, [expected[0], expected[0], expected[1], expected[1]]);
+    assert!(rows.iter().all(|row| (20.0..60.0).contains(&row.route_m)), "{rows:?}");
 }
 
 #[test]

@@ -255,7 +255,7 @@ fn two_parameters() -> (Weights, [Tensor; 2]) {
 #[test]
 fn adamw_takes_the_steps_of_its_formula() {
     let (weights, [b, a]) = two_parameters();
-    let mut adam = Adam::new(&weights, 0.1);
+    let mut adam = Adam::new(&weights, 0.1).unwrap();
     let flat = |t: &Tensor| -> Vec<f64> {
         let t = t.flatten_all().unwrap().to_dtype(DType::F64).unwrap();
         t.to_vec1().unwrap()
@@ -300,7 +300,7 @@ fn adamw_takes_the_steps_of_its_formula() {
 fn gradient_that_is_not_finite_is_named_and_changes_nothing() {
     let (weights, [b, a]) = two_parameters();
     let before = weights.snapshot().unwrap();
-    let mut adam = Adam::new(&weights, 0.0);
+    let mut adam = Adam::new(&weights, 0.0).unwrap();
     let loss = (a.sum_all().unwrap() + (b.sum_all().unwrap() * f64::INFINITY).unwrap()).unwrap();
     let mut gradient = Gradient::default();
     gradient.add(&weights, loss.backward().unwrap()).unwrap();

@@ -81,6 +81,8 @@ mod recording;
 mod one_pixel;
 #[cfg(feature = "learning")]
 mod operations;
+#[cfg(feature = "learning")]
+mod composed;
 mod replay;
 mod closed_loop;
 mod ranging;

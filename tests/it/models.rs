@@ -147,7 +147,7 @@ fn network_does_without_each_part_that_is_disabled() {
 fn dropout_depends_on_seed_step_part_and_place_and_keeps_the_mean() {
     let x = Tensor::ones((100, 100), DType::F32, &Cpu).unwrap();
     let drop = |pass: Pass, layer: &str| numbers(&pass.dropout(&x, 0.3, layer).unwrap());
-    let learn = |seed, step, part| Pass::Learn { seed, step, part };
+    let learn = |seed, step, part| Pass::Learn { seed, step, part, activations: None };
     let first = drop(learn(1, 2, 3), "a");
     assert_eq!(first, drop(learn(1, 2, 3), "a"));
     for other in [learn(0, 2, 3), learn(1, 0, 3), learn(1, 2, 0)] {
@@ -167,10 +167,10 @@ fn every_model_learns_a_batch_by_heart() {
         let cfg = NetConfig::preset(*model, Preset::Nano);
         let ((weights, net), batch) = (fresh(&cfg), batch(&cfg, 4));
         let loss_config = TrainConfig::default().loss;
-        let mut adam = Adam::new(&weights, 0.0);
+        let mut adam = Adam::new(&weights, 0.0).unwrap();
         let mut action = f64::INFINITY;
         for step in 0..400 {
-            let pass = Pass::Learn { seed: 0, step, part: 0 };
+            let pass = Pass::Learn { seed: 0, step, part: 0, activations: None };
             let output = net.forward(&batch.inputs, &pass).unwrap();
             let sums = LossSums::new(&output, &batch.targets, Assign::Soft).unwrap();
             action = sums.read().unwrap().terms(&loss_config).action.unwrap();
@@ -242,7 +242,7 @@ fn mixture_recovers_the_distribution_that_it_is_shown() {
     })
     .unwrap();
     weights.set(&values).unwrap();
-    let mut adam = Adam::new(&weights, 0.0);
+    let mut adam = Adam::new(&weights, 0.0).unwrap();
     let valid = Tensor::ones((256, 30), DType::F32, &Cpu).unwrap();
     let steps = 900;
     for step in 0..steps {

@@ -107,7 +107,9 @@ fn check(name: &str, model: Model, preset: Preset, frames: usize) {
     let torch: Fixture = serde_json::from_str(&text).unwrap();
     let config = recipe(model, preset);
     let (weights, net, batch) = made(&config, frames);
-    let output = net.forward(&batch.inputs, &Pass::Learn { seed: 0, step: 0, part: 0 }).unwrap();
+    let output = net
+        .forward(&batch.inputs, &Pass::Learn { seed: 0, step: 0, part: 0, activations: None })
+        .unwrap();
     let numbers = |t: &Tensor| t.flatten_all().unwrap().to_vec1::<f32>().unwrap();
     let near = |ours: &[f32], theirs: &[f64], what: &str| {
         assert_eq!(ours.len(), theirs.len(), "{name}: {what}");

@@ -36,6 +36,26 @@ fn configuration_that_makes_no_sense_is_refused_before_anything_is_made() {
 }
 
 #[test]
+fn place_that_is_none_is_bad_usage() {
+    let done = pmp_train(&["--data", "d", "--out", "r", "--device", "gpu"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(stderr(&done).contains("`gpu` is none of auto, cpu, cuda, cuda:N"));
+}
+
+#[cfg(not(feature = "cuda"))]
+#[test]
+fn gpu_is_refused_by_a_program_built_without_cuda() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    let done = pmp_train(&["--data", "d", "--out", out.to_str().unwrap(), "--device", "cuda:1"]);
+    assert_eq!(done.status.code(), Some(1));
+    let text = stderr(&done);
+    assert!(text.contains("device: cuda:1 in a program that was built without CUDA"), "{text}");
+    assert!(text.contains("scripts/build_cuda.sh"), "{text}");
+    assert!(!out.exists());
+}
+
+#[test]
 fn network_is_described_without_data() {
     let done = pmp_train(&["--describe", "--model", "int", "--preset", "nano"]);
     assert_eq!(done.status.code(), Some(0));

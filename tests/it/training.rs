@@ -14,7 +14,8 @@ use pmp::{
     dataset::batch::{Batch, Batches, Inputs, Targets},
     error::{Error, Result},
     model::{
-        config::TrainConfig,
+        config::{Precision, TrainConfig},
+        device::Place,
         learned::Learned,
         net_config::{Model, NetConfig, Part, PictureConfig, PmpConfig, Preset},
         run,
@@ -310,6 +311,37 @@ fn steps_may_be_raised_and_nothing_else_may_change() {
     assert!(matches!(events[0], Event::Started { step: 13, .. }));
     assert_eq!(run::manifest(&out).unwrap().unwrap().step, 15);
     assert_eq!(run::saved_config(&out).unwrap().unwrap(), more);
+}
+
+#[test]
+fn run_may_be_continued_on_another_device_and_half_precision_is_not_for_the_cpu() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    run(&small(), &out, false).unwrap();
+    let elsewhere = TrainConfig { device: Place::Cuda(1), steps: 14, ..small() };
+    run(&elsewhere, &out, true).unwrap();
+    let saved = run::saved_config(&out).unwrap().unwrap();
+    assert_eq!(saved, elsewhere);
+
+    let half = TrainConfig { precision: Precision::Bf16, ..small() };
+    let other = dir.path().join("half");
+    let error = run(&half, &other, false).unwrap_err();
+    assert_eq!(error.to_string(), "precision: bf16 is for GPUs, and this is the CPU");
+    assert!(!other.exists());
+}
+
+#[test]
+fn runs_of_before_there_were_devices_can_be_continued() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    run(&small(), &out, false).unwrap();
+    let file = out.join("config.json");
+    let text = fs::read_to_string(&file).unwrap();
+    let without = |line: &&str| !line.contains("\"device\"") && !line.contains("\"precision\"");
+    let lines: Vec<&str> = text.lines().filter(without).collect();
+    assert_eq!(lines.len(), text.lines().count() - 2);
+    fs::write(&file, lines.join("\n")).unwrap();
+    run(&TrainConfig { steps: 14, ..small() }, &out, true).unwrap();
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Batch norm with residual and ReLU, forwards and backwards.
 
-use pmp_kernels::norm::{Backward, Gate, Map, Moments, Residual, apply};
+use pmp_kernels::norm::{self, Backward, Gate, Map, Moments, Residual, apply};
 use proptest::prelude::*;
 
 use crate::naive::{numbers, off, same_bits};
@@ -148,6 +148,19 @@ fn norm_has_the_same_bits_on_any_number_of_threads() {
             [back.grad_scale, back.grad_shift, grad, grad_x].concat()
         });
     }
+}
+
+#[test]
+fn addition_is_of_each_number_and_has_the_same_bits_on_any_number_of_threads() {
+    let (x, sum) = (numbers(1, 100_003), numbers(2, 100_003)); // several pieces, the last not full
+    same_bits(|| {
+        let mut sum = sum.clone();
+        norm::add(&x, &mut sum);
+        sum
+    });
+    let mut added = sum.clone();
+    norm::add(&x, &mut added);
+    assert!(added.iter().zip(x.iter().zip(&sum)).all(|(added, (x, sum))| *added == x + sum));
 }
 
 #[test]

@@ -106,4 +106,10 @@ fn poolings_have_the_same_bits_on_any_number_of_threads() {
         pooling::mean(33 * 41, 19, &x, &mut out);
         out
     });
+    let grad = numbers(5, 2 * 19);
+    same_bits(|| {
+        let mut grad_x = vec![0.0; s.input_len()];
+        pooling::backward_mean(33 * 41, 19, &grad, &mut grad_x);
+        grad_x
+    });
 }

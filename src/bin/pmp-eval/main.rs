@@ -39,6 +39,7 @@ Examples:
 Exit codes: 0 done; 1 failed; 2 misused; 3 done, but not every held-out frame was evaluated";
 
 fn main() -> ExitCode {
+    pmp_kernels::buffers::keep_freed_memory();
     cli::main(|| match Args::parse().command {
         Command::Offline(args) => offline::run(&args),
         Command::Drive(args) => drive::run(&args),

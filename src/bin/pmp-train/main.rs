@@ -14,8 +14,8 @@ use pmp::cli;
 ///
 /// The run directory holds the configuration, checkpoints and the curves (metrics.jsonl,
 /// curves.svg, and a file for TensorBoard). It can drive as soon as it has a checkpoint. Training
-/// can be stopped at any moment: with --resume it ends with the same weights, bit for bit, as if
-/// it never was.
+/// can be stopped at any moment: with --resume it ends with the same weights, on the CPU bit for
+/// bit, as if it never was.
 #[derive(Parser)]
 #[command(version, after_help = AFTER, args_conflicts_with_subcommands = true)]
 struct Args {
@@ -38,6 +38,7 @@ Examples:
   pmp-train --data data/ --out runs/no-camera --disable camera
   pmp-train --data data/ --out runs/first --resume --steps 6000
   pmp-train --data data/ --out runs/mine --config mine.toml
+  pmp-train --data data/ --out runs/paper --preset paper --device cuda
   pmp-train --describe --model int --preset paper
   pmp-train sweep --data data/ --out runs/grid --grid grid.toml
 

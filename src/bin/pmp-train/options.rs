@@ -16,6 +16,7 @@ use pmp::{
     error::{Error, Result},
     model::{
         config::TrainConfig,
+        device::Place,
         net_config::{Model, Part, Preset},
         train::Data,
     },
@@ -47,6 +48,11 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", help_heading = "Configuration")]
     pub(crate) batch_size: Option<usize>,
 
+    /// Where to compute: auto, cpu, cuda or cuda:N [default: auto, a GPU if this program was built
+    /// for one and it answers]
+    #[arg(long, value_name = "WHERE", help_heading = "Configuration")]
+    pub(crate) device: Option<Place>,
+
     /// Do without a part, to see what it is worth
     #[arg(long, value_name = "PART", value_delimiter = ',', help_heading = "Configuration")]
     pub(crate) disable: Vec<Part>,
@@ -69,6 +75,7 @@ impl Options {
         config.steps = self.steps.unwrap_or(config.steps);
         config.seed = self.seed.unwrap_or(config.seed);
         config.batch_size = self.batch_size.unwrap_or(config.batch_size);
+        config.device = self.device.unwrap_or(config.device);
         config.net.disable(&self.disable)?;
         config.validate()?;
         Ok(config)

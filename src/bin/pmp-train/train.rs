@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use candle_core::Device;
+use candle_core::DeviceLocation;
 use clap::Args;
 use indicatif::ProgressBar;
 use pmp::{
@@ -32,7 +32,7 @@ pub(crate) struct Train {
     out: Option<PathBuf>,
 
     /// Continue a run from its last checkpoint, with the configuration it was started with
-    /// (only --steps may be raised); starts it if there is none yet
+    /// (only --steps may be raised, --device changed); starts it if there is none yet
     #[arg(long)]
     resume: bool,
 
@@ -66,12 +66,12 @@ pub(crate) fn watched(
     resume: bool,
     what: String,
 ) -> Result<Option<ValidationLine>> {
-    let device = Device::Cpu;
+    let device = config.device.open()?;
     let mut data = open_data(data, config, &device)?;
     let bar = cli::progress(config.steps, "steps", what);
     let mut last = None;
     train_run(config, out, resume, &mut data, &device, &mut |event| {
-        show(event, config, &bar);
+        show(event, config, device.location(), &bar);
         if let Event::Validated { line, .. } = event {
             last = Some(line.clone());
         }
@@ -81,7 +81,7 @@ pub(crate) fn watched(
     Ok(last)
 }
 
-fn show(event: &Event, config: &TrainConfig, bar: &ProgressBar) {
+fn show(event: &Event, config: &TrainConfig, place: DeviceLocation, bar: &ProgressBar) {
     let is_terminal = std::io::stderr().is_terminal();
     let say = |text: String| match is_terminal {
         true => bar.println(text),
@@ -91,7 +91,12 @@ fn show(event: &Event, config: &TrainConfig, bar: &ProgressBar) {
     match event {
         Event::Started { step, parameters } => {
             bar.set_position(*step);
-            say(format!("{parameters} parameters, from step {step} of {}", config.steps));
+            let place = match place {
+                DeviceLocation::Cuda { gpu_id } => format!("GPU {gpu_id}"),
+                _ => "the CPU".to_string(),
+            };
+            let steps = config.steps;
+            say(format!("{parameters} parameters, from step {step} of {steps}, on {place}"));
         }
         Event::Trained { line, log } => {
             bar.set_position(line.step);

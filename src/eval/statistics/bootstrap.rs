@@ -10,6 +10,8 @@ use rand_chacha::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::eval::statistics::rank::selected_quantile;
+
 /// Fewest units from which a claim is made.
 ///
 /// With `n` units that all point the same way, a two-sided sign test gives `2 / 2^n`: 0.06 for
@@ -112,11 +114,11 @@ impl Bootstrap {
         Some(self.middle(&mut found))
     }
 
-    /// Between which two the share [`Bootstrap::level`] of some values lies, the same number
-    /// below as above; changes their order.
+    /// Between which two the share [`Bootstrap::level`] of some values lies, as many below as above;
+    /// changes their order.
     pub(crate) fn middle(&self, values: &mut [f64]) -> [f64; 2] {
         let tail = (1.0 - self.level) / 2.0;
-        [selected(values, tail), selected(values, 1.0 - tail)]
+        [tail, 1.0 - tail].map(|share| selected_quantile(values, share))
     }
 }
 
@@ -137,16 +139,4 @@ pub fn units_with_a_value(values: &[Option<f64>], unit_of: &[u32]) -> usize {
 pub(crate) fn draw(units: usize, random: &mut ChaCha8Rng) -> usize {
     // Multiply-shift rather than a library's range: its stream may change with its version.
     ((u128::from(random.next_u64()) * units as u128) >> 64) as usize
-}
-
-/// The value below which that share of the values lies, linear between the two nearest, as
-/// [`quantile`](crate::eval::statistics::rank::quantile) of sorted ones; changes their order. Sorting
-/// the resamples of every metric would take most of the time of a table.
-fn selected(values: &mut [f64], share: f64) -> f64 {
-    let at = share * (values.len() - 1) as f64;
-    let (_, &mut low, above) = values.select_nth_unstable_by(at as usize, f64::total_cmp);
-    match above.iter().copied().min_by(f64::total_cmp) {
-        Some(high) if at.fract() > 0.0 => low + (high - low) * at.fract(),
-        _ => low,
-    }
 }

@@ -84,13 +84,17 @@ impl Bootstrap {
                 }
             }
         }
-        let interval = |found: &mut Vec<f64>| {
-            let first = *found.first()?;
-            let alike = found.iter().all(|value| *value == first);
-            let ends = (!alike).then(|| self.middle(found))?;
-            (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
-        };
-        resampled.iter_mut().map(interval).collect()
+        resampled.iter_mut().map(|found| self.telling(found)).collect()
+    }
+
+    /// The middle of some values; `None` if they are all the same, or an end of it is not finite.
+    fn telling(&self, values: &mut [f64]) -> Option<[f64; 2]> {
+        let first = *values.first()?;
+        if values.iter().all(|value| *value == first) {
+            return None;
+        }
+        let ends = self.middle(values);
+        (ends[0] < ends[1] && ends.iter().all(|end| end.is_finite())).then_some(ends)
     }
 }
 

@@ -1,11 +1,15 @@
 //! 2-D convolution.
 
-use candle_core::{DType, Shape, Tensor};
+use candle_core::{Shape, Tensor};
 use pmp_kernels::conv;
 
 use crate::{
     error::Result,
-    model::ops::{numbers::Numbers, ready::with_gradient},
+    model::ops::{
+        composed,
+        numbers::{Numbers, is_for_kernels},
+        ready::with_gradient,
+    },
 };
 
 /// How a kernel moves over a picture, the same down and right.
@@ -41,10 +45,8 @@ type Fill<'f> = &'f dyn Fn(&[&[f32]], &[f32], &mut [f32]);
 /// # Errors
 ///
 /// [`Error::Tensor`](crate::error::Error::Tensor) if shapes disagree, the padded picture is
-/// smaller than the kernel.
-///
-/// On other devices and for other types it is candle's own convolution, whose way back fails where
-/// a stride leaves pixels of a picture over, and not of the same number down and right.
+/// smaller than the kernel; where it is composed, also for a kernel that is not square or not
+/// larger than the padding.
 pub fn conv2d(x: &Tensor, weight: &Tensor, bias: Option<&Tensor>, conv: Conv) -> Result<Tensor> {
     let (batch, height, width, channels) = x.dims4()?;
     let (out_channels, of_weight, down, right) = weight.dims4()?;
@@ -64,11 +66,12 @@ pub fn conv2d(x: &Tensor, weight: &Tensor, bias: Option<&Tensor>, conv: Conv) ->
         let what = format!("convolution of {:?} by {weight:?}, {bias:?}, {conv:?}", x.dims());
         return Err(candle_core::Error::msg(what).into());
     };
-    if !(x.device().is_cpu() && x.dtype() == DType::F32) {
-        let planes = x.permute((0, 3, 1, 2))?.contiguous()?;
-        let out = planes.conv2d(weight, conv.padding, conv.stride, 1, 1)?;
-        let out = out.permute((0, 2, 3, 1))?.contiguous()?;
-        return Ok(bias.map_or(Ok(out.clone()), |bias| out.broadcast_add(bias))?);
+    if !is_for_kernels(x) {
+        if down != right || conv.padding >= down {
+            let what = format!("convolution by {down} x {right}, {conv:?} is not composed");
+            return Err(candle_core::Error::msg(what).into());
+        }
+        return composed::conv2d(x, weight, bias, conv.stride, conv.padding);
     }
     let arguments: Vec<&Tensor> = [x, weight].into_iter().chain(bias).collect();
     let numbers = Numbers::of(arguments.iter().copied())?;

@@ -2,19 +2,23 @@
 
 use std::sync::Arc;
 
-use candle_core::Tensor;
+use candle_core::{Device, Tensor};
 use pmp_kernels::norm::{self, Backward, Gate, Moments, Residual};
 
 use crate::{
     error::Result,
-    model::ops::{numbers::Numbers, ready::with_gradient},
+    model::ops::{
+        composed,
+        numbers::{Numbers, is_for_kernels},
+        ready::with_gradient,
+    },
 };
 
 /// What normalises.
 #[derive(Clone, Debug)]
 pub struct Norm {
-    /// Mean and variance of each channel; `None` for those of the batch.
-    pub moments: Option<Moments>,
+    /// Mean and variance of each channel, `[C]`; `None` for those of the batch.
+    pub moments: Option<[Tensor; 2]>,
     /// Added to the variance.
     pub eps: f64,
     pub relu: bool,
@@ -35,17 +39,17 @@ pub struct Norm {
 ///
 /// # Errors
 ///
-/// [`Error::Tensor`](crate::error::Error::Tensor) if shapes disagree, `x` is empty, or a tensor is
-/// not f32 on the CPU.
+/// [`Error::Tensor`](crate::error::Error::Tensor) if shapes disagree, `x` is empty, or one of
+/// several tensors is of another device.
 pub fn batch_norm(
     x: &Tensor,
     scale: &Tensor,
     shift: &Tensor,
     residual: Option<&Tensor>,
     norm: &Norm,
-) -> Result<(Tensor, Moments)> {
+) -> Result<(Tensor, [Tensor; 2])> {
     let channels = x.dims().last().copied().unwrap_or(0);
-    let of = |moments: &Moments| [moments.mean.len(), moments.variance.len()] == [channels; 2];
+    let of = |moments: &[Tensor; 2]| moments.iter().all(|moment| moment.dims() == [channels]);
     let fits = [scale, shift].iter().all(|tensor| tensor.dims() == [channels])
         && residual.is_none_or(|residual| residual.dims() == x.dims())
         && norm.moments.as_ref().is_none_or(of)
@@ -57,19 +61,24 @@ pub fn batch_norm(
         return Err(candle_core::Error::msg(what).into());
     }
     let both = Tensor::stack(&[scale, shift], 0)?; // candle's operations have three arguments
+    if !is_for_kernels(x) {
+        let moments = norm.moments.as_ref();
+        return composed::batch_norm(x, &both, residual, moments, norm.eps, norm.relu);
+    }
     let arguments: Vec<&Tensor> = [x, &both].into_iter().chain(residual).collect();
     let numbers = Numbers::of(arguments.iter().copied())?;
     let mut out = vec![0.0; x.elem_count()];
     let (eps, relu, of_batch) = (norm.eps, norm.relu, norm.moments.is_none());
+    let given = norm.moments.as_ref().map(moments_of).transpose()?;
     let (moments, map) = numbers.read(|slices| {
-        let moments = norm.moments.clone().unwrap_or_else(|| Moments::of(channels, slices[0]));
+        let moments = given.unwrap_or_else(|| Moments::of(channels, slices[0]));
         let (scale, shift) = slices[1].split_at(channels);
         let map = moments.map(scale, shift, eps);
         let residual = slices.get(2).map(|x| Residual { x, affine: None });
         norm::apply(slices[0], map.as_affine(), residual, relu, &mut out);
         (moments, map)
     });
-    let used = moments.clone();
+    let used = tensors_of(&moments)?;
     let shape = x.shape().clone();
     // With a residual, where the ReLU is open is seen from the result only.
     let tracked = arguments.iter().any(|tensor| tensor.track_op());
@@ -102,4 +111,24 @@ pub fn batch_norm(
     };
     let out = with_gradient("batch-norm", (out, shape), &arguments, Box::new(back))?;
     Ok((out, used))
+}
+
+/// Mean and variance, `[C]`, as the kernels take them.
+///
+/// # Errors
+///
+/// [`Error::Tensor`](crate::error::Error::Tensor) if they are not f32 on the CPU.
+pub fn moments_of([mean, variance]: &[Tensor; 2]) -> Result<Moments> {
+    let numbers = Numbers::of([mean, variance])?;
+    Ok(numbers.read(|slices| Moments { mean: slices[0].into(), variance: slices[1].into() }))
+}
+
+/// And back.
+///
+/// # Errors
+///
+/// [`Error::Tensor`](crate::error::Error::Tensor) if memory runs out.
+pub fn tensors_of(moments: &Moments) -> Result<[Tensor; 2]> {
+    let tensor = |numbers: &[f32]| Tensor::new(numbers, &Device::Cpu);
+    Ok([tensor(&moments.mean)?, tensor(&moments.variance)?])
 }

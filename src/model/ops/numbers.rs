@@ -4,6 +4,16 @@ use candle_core::{CpuStorage, DType, Storage, Tensor};
 
 use crate::error::Result;
 
+/// Whether `pmp_kernels` computes on it; if not, candle does.
+pub fn is_for_kernels(x: &Tensor) -> bool {
+    x.device().is_cpu() && x.dtype() == DType::F32
+}
+
+/// The type that numbers of a type are summed up in.
+pub fn wide(kind: DType) -> DType {
+    if kind == DType::F64 { DType::F64 } else { DType::F32 }
+}
+
 /// Contiguous f32 tensors on the CPU, to be read as slices.
 #[derive(Clone, Debug)]
 pub struct Numbers(Vec<Tensor>);
@@ -16,7 +26,7 @@ impl Numbers {
     /// [`Error::Tensor`](crate::error::Error::Tensor) if a tensor is of another type or device.
     pub fn of<'t>(tensors: impl IntoIterator<Item = &'t Tensor>) -> Result<Self> {
         let contiguous = |tensor: &Tensor| {
-            if !tensor.device().is_cpu() || tensor.dtype() != DType::F32 {
+            if !is_for_kernels(tensor) {
                 let (kind, place) = (tensor.dtype(), tensor.device().location());
                 let what = format!("operation for f32 on the CPU, not {kind:?} on {place:?}");
                 return Err(candle_core::Error::msg(what).into());

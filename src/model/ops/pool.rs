@@ -5,7 +5,12 @@ use pmp_kernels::pooling;
 
 use crate::{
     error::Result,
-    model::ops::{conv::Conv, numbers::Numbers, ready::with_gradient},
+    model::ops::{
+        composed,
+        conv::Conv,
+        numbers::{Numbers, is_for_kernels},
+        ready::with_gradient,
+    },
 };
 
 /// The largest number of each window of `kernel` x `kernel` pixels: `x` `[B, H, W, C]` to
@@ -14,8 +19,7 @@ use crate::{
 /// # Errors
 ///
 /// [`Error::Tensor`](crate::error::Error::Tensor) if the padded picture is smaller than the
-/// window, the padding not smaller than it, the window larger than 16 x 16, or `x` not f32 on the
-/// CPU.
+/// window, the padding not smaller than it, or the window larger than 16 x 16.
 pub fn max_pool(x: &Tensor, kernel: usize, conv: Conv) -> Result<Tensor> {
     let (batch, height, width, channels) = x.dims4()?;
     let shape = pooling::Shape {
@@ -32,6 +36,9 @@ pub fn max_pool(x: &Tensor, kernel: usize, conv: Conv) -> Result<Tensor> {
         let what = format!("maximum of {kernel} x {kernel} of {:?}, {conv:?}", x.dims());
         return Err(candle_core::Error::msg(what).into());
     };
+    if !is_for_kernels(x) {
+        return composed::max_pool(x, kernel, conv.stride, conv.padding);
+    }
     let mut out = vec![0.0; shape.output_len()];
     let mut which = vec![0; out.len()];
     Numbers::of([x])?.read(|slices| pooling::max(&shape, slices[0], &mut out, &mut which));
