@@ -25,7 +25,7 @@ use pmp::{
     control::{driver::ControlConfig, fusion::Fusion},
     error::{Error, Result},
     eval::{baseline, calibration, table},
-    model::learned::Learned,
+    model::{learned::Learned, run},
 };
 
 /// Let policies drive the episodes of a suite in the simulator, and count what comes of it
@@ -256,6 +256,17 @@ fn fusion(kind: FusionKind, args: &Drive, name: &str) -> Result<Fusion> {
                      give --c1 and --c2, or --fusion a1"
                 )),
             })?;
+            let now = run::manifest(Path::new(name))?.map(|manifest| manifest.checkpoint);
+            if now.as_ref().is_some_and(|now| *now != calibration.checkpoint) {
+                return Err(Error::Run {
+                    path: name.into(),
+                    what: format!(
+                        "its constants of eq. (3) are those of {}, and it has learned on since",
+                        calibration.checkpoint
+                    ),
+                    hint: Some("`pmp-eval calibrate --force` makes them anew".into()),
+                });
+            }
             for warning in &calibration.warnings {
                 eprintln!("warning: {name}: {warning}");
             }
