@@ -27,8 +27,10 @@ use crate::{
 };
 
 /// Suites of the package: name, file.
-const SUITES: [(&str, &str); 1] =
-    [("deeptest", include_str!("../../schemas/suites/deeptest.toml"))];
+const SUITES: [(&str, &str); 2] = [
+    ("deeptest", include_str!("../../schemas/suites/deeptest.toml")),
+    ("empty", include_str!("../../schemas/suites/empty.toml")),
+];
 
 /// Version of the keys below.
 const VERSION: u32 = 1;

@@ -482,6 +482,9 @@ fn deeptest_is_what_the_paper_says_of_it() {
     let full = Suite::open("deeptest", None, Extent::Full).unwrap();
     assert_eq!(full.episodes.len(), 216);
     assert_eq!(full.towns(), ["Town03", "Town05", "Town06", "Town07"]);
+    let empty = Suite::open("empty", None, Extent::Full).unwrap();
+    assert_eq!((empty.episodes.len(), empty.towns()), (216, full.towns()));
+    assert_eq!((empty.seed, empty.rules), (full.seed, full.rules));
     assert_eq!(Suite::open("deeptest", None, Extent::Quick).unwrap().episodes.len(), 36);
     let of = |town: &str, traffic| {
         let of_task = full.episodes.iter().filter(move |e| e.town == town && e.traffic == traffic);
