@@ -35,6 +35,7 @@ pub mod sensors;
 pub mod sim;
 pub mod closed_loop;
 pub mod chart;
+pub mod page;
 #[cfg(feature = "learning")]
 pub mod model;
 #[cfg(feature = "reports")]

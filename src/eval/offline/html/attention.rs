@@ -4,11 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::{
     chart::palette::escaped,
-    eval::offline::{
-        html::tags::{code, named, paragraph, section, table},
-        plot::drivers,
-        report::Report,
-    },
+    eval::offline::{plot::drivers, report::Report},
+    page::tags::{code, named, paragraph, section, table},
 };
 
 /// A table for each policy with attention: mean share of each branch, over all frames and in parts.

@@ -1,10 +1,13 @@
 //! Every number, and what it is.
 
-use crate::eval::offline::{
-    html::tags::{cell, code, named, paragraph, section, table, unit},
-    plot::drivers,
-    render::{metrics_had, of},
-    report::{Definition, Report},
+use crate::{
+    eval::offline::{
+        html::cell::cell,
+        plot::drivers,
+        render::{metrics_had, of},
+        report::{Definition, Report},
+    },
+    page::tags::{code, named, paragraph, section, table, unit},
 };
 
 /// Every metric that a policy has, by group, then definitions.

@@ -1,10 +1,13 @@
 //! What a reader wants to know first: what may be said, and the numbers it rests on.
 
-use crate::eval::offline::{
-    html::tags::{cell, code, named, section, table, unit},
-    plot::drivers,
-    render::{basis, metrics_had, of},
-    report::Report,
+use crate::{
+    eval::offline::{
+        html::cell::cell,
+        plot::drivers,
+        render::{basis, metrics_had, of},
+        report::Report,
+    },
+    page::tags::{code, named, section, table, unit},
 };
 
 /// Metrics of the first table.

@@ -7,10 +7,10 @@ use crate::{
         scale::Axis,
     },
     eval::offline::{
-        html::tags::{paragraph, row, section, unit},
         plot::{drivers, enough},
         report::{PolicyReport, Report},
     },
+    page::tags::{paragraph, row, section, unit},
 };
 
 /// Curves of what is wrong, and those of what a mixture says.

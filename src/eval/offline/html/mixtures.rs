@@ -7,13 +7,11 @@ use crate::{
         reliability::reliability,
     },
     eval::offline::{
-        html::{
-            horizons::curve,
-            tags::{named, paragraph, row, section},
-        },
+        html::horizons::curve,
         plot::drivers,
         report::{Pit, Report},
     },
+    page::tags::{named, paragraph, row, section},
 };
 
 /// Of a reliability diagram, which is square.

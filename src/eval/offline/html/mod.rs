@@ -4,7 +4,7 @@
 //! report -> headline, horizons, mixtures, variance, slices, attention, definitions -> page
 //! ```
 
-pub mod tags;
+pub mod cell;
 pub mod headline;
 pub mod horizons;
 pub mod mixtures;

@@ -7,10 +7,10 @@ use crate::{
         scale::Axis,
     },
     eval::offline::{
-        html::tags::{MISSING, code, named, paragraph, row, section, table, unit},
         plot::{drivers, enough},
         report::{Report, Slice},
     },
+    page::tags::{MISSING, code, named, paragraph, row, section, table, unit},
 };
 
 /// Metrics of the tables; the first two are drawn as well.

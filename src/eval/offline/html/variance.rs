@@ -9,10 +9,10 @@ use crate::{
     },
     control::fusion::Fusion,
     eval::offline::{
-        html::tags::{named, paragraph, row, section},
         plot::drivers,
         report::{Report, Variance},
     },
+    page::tags::{named, paragraph, row, section},
 };
 
 /// Of a chart with many cells.

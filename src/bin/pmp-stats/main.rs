@@ -1,12 +1,11 @@
-//! `pmp-stats`: a dataset in, one screen of numbers out.
+//! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
-use std::{path::PathBuf, process::ExitCode};
+mod report;
+
+use std::process::ExitCode;
 
 use clap::Parser;
-use pmp::{
-    cli::{self, Outcome},
-    stats::query,
-};
+use pmp::cli;
 
 /// Show what is in a dataset, what is missing, and what was left out
 ///
@@ -19,12 +18,8 @@ use pmp::{
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES)]
 struct Args {
-    /// Dataset made by pmp-ingest
-    dataset: PathBuf,
-
-    /// Print one JSON object; its fields are described in schemas/stats.v1.json
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    report: report::Report,
 }
 
 const EXAMPLES: &str = "\
@@ -36,10 +31,5 @@ Examples:
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    cli::main(|| {
-        let summary = query::summarise(&args.dataset)?;
-        cli::print(&if args.json { summary.json() } else { summary.screen().to_string() })?;
-        Ok(Outcome::Done)
-    })
+    cli::main(|| report::run(&Args::parse().report))
 }

@@ -1,6 +1,6 @@
 //! Pieces of HTML that several sections are made of.
 
-use crate::{chart::palette::escaped, eval::offline::report::Estimate};
+use crate::chart::palette::escaped;
 
 /// What a missing value looks like.
 pub const MISSING: &str = "–";
@@ -49,16 +49,7 @@ pub fn code(text: &str) -> String {
         .collect()
 }
 
-/// A number with its interval beneath.
-pub fn cell(estimate: &Estimate) -> String {
-    let Some(value) = estimate.value else { return MISSING.to_string() };
-    let interval = estimate
-        .interval
-        .map_or(String::new(), |[low, high]| format!("<br><small>{low:.3} … {high:.3}</small>"));
-    format!("{value:.3}{interval}")
-}
-
-/// The name of a policy behind a mark of its colour.
+/// A name behind a mark of its colour.
 pub fn named(name: &str, colour: &str) -> String {
     format!("<span class=\"mark\" style=\"color:{colour}\">■</span> <code>{}</code>", escaped(name))
 }
