@@ -3,3 +3,4 @@
 pub mod summary;
 pub mod query;
 pub mod screen;
+pub mod check;
