@@ -93,6 +93,10 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "checks")]
+mod checks;
+#[cfg(feature = "checks")]
+mod check_faults;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]

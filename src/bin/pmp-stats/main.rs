@@ -1,6 +1,7 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
 mod check;
+#[cfg(feature = "reports")]
 mod report;
 
 use std::process::ExitCode;
@@ -20,6 +21,7 @@ use pmp::cli;
 #[command(version, after_help = EXAMPLES)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
+    #[cfg(feature = "reports")]
     #[command(flatten)]
     report: Option<report::Report>,
 
@@ -44,6 +46,7 @@ Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset
 fn main() -> ExitCode {
     cli::main(|| match Args::parse() {
         Args { command: Some(Command::Check(check)), .. } => check::run(&check),
+        #[cfg(feature = "reports")]
         Args { report: Some(report), .. } => report::run(&report),
         // Without a subcommand the report's dataset is required.
         _ => Args::command().error(ErrorKind::MissingSubcommand, "give a dataset").exit(),

@@ -357,10 +357,10 @@ fn pedals(track: &Track, motion: &Motion) -> Vec<Finding> {
         .zip(brake)
         .map(|(throttle, brake)| Some(f64::from((*throttle)?) - f64::from((*brake)?)))
         .collect();
-    // At rest the brake is down and nothing moves.
+    // At rest the brake is down and nothing moves; in reverse the throttle makes the speed grow as well.
     let answer = |row: usize| {
         (motion.is_step[row] && motion.speed_mps[row].abs() > TELLING_MPS)
-            .then(|| motion.acceleration_mps2[row])
+            .then(|| motion.acceleration_mps2[row] * motion.speed_mps[row].signum())
     };
     let answer: Vec<Option<f64>> = (0..track.len()).map(answer).collect();
     let spread = [CHANNEL_SPREAD, ACCELERATION_SPREAD_MPS2];
