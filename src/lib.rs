@@ -15,6 +15,7 @@
 pub mod error;
 pub mod digits;
 pub mod atomic;
+pub mod table_file;
 pub mod claim;
 pub mod remote;
 pub mod projection;

@@ -8,6 +8,7 @@
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
 //! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, summary, inspect
+//! edit: datasets made of datasets (merge, drop, resplit), each a whole new one
 //! open (which frames train, which judge; traits: what kind of moment each is)
 //!   -> balance -> order -> sample -> augment -> batch, by loader
 //! ```
@@ -54,6 +55,7 @@ pub mod ingest_event;
 pub mod plan;
 pub mod ingest;
 pub mod publish;
+pub mod edit;
 pub mod inspect;
 pub mod open;
 pub mod balance;

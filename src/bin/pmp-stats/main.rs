@@ -1,10 +1,11 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
+mod edit;
 mod report;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use pmp::cli;
 
 /// Show what is in a dataset, what is missing, and what was left out
@@ -17,9 +18,23 @@ use pmp::cli;
 /// value. A share counts the frames whose value is not null.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
     #[command(flatten)]
-    report: report::Report,
+    report: Option<report::Report>,
+
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Put datasets together into a new one; prints its identity
+    Merge(edit::Merge),
+    /// Make a new dataset without some episodes; prints its identity
+    Drop(edit::Drop),
+    /// Make a new dataset with other episodes to train and to judge; prints its identity
+    Resplit(edit::Resplit),
 }
 
 const EXAMPLES: &str = "\
@@ -27,9 +42,20 @@ Examples:
   pmp-stats data                             one screen
   pmp-stats data --json > stats.json         the same as data
   pmp-stats data --json | jq .splits.train.hours
+  pmp-stats merge monday tuesday --out week
+  pmp-stats drop week --log tunnel.mcap --out week-2
+  pmp-stats resplit week-2 --val-town Town02 --out week-3
 
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
 fn main() -> ExitCode {
-    cli::main(|| report::run(&Args::parse().report))
+    let args = Args::parse();
+    cli::main(|| match (&args.command, &args.report) {
+        (Some(Command::Merge(merge)), _) => edit::run_merge(merge),
+        (Some(Command::Drop(drop)), _) => edit::run_drop(drop),
+        (Some(Command::Resplit(resplit)), _) => edit::run_resplit(resplit),
+        (None, Some(report)) => report::run(report),
+        // Without a command clap wants the arguments of the report.
+        (None, None) => Ok(cli::Outcome::Done),
+    })
 }
