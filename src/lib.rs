@@ -28,6 +28,7 @@ pub mod footprint;
 pub mod policy;
 pub mod control;
 pub mod dataset;
+pub mod lerobot;
 pub mod map;
 pub mod towns;
 pub mod world;

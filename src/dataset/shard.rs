@@ -214,6 +214,11 @@ fn row_skews(batch: &RecordBatch) -> Result<Vec<Skew>, String> {
     (0..batch.num_rows()).map(|row| columns.skew(row)).collect()
 }
 
+fn row_actions(batch: &RecordBatch) -> Result<Vec<[Option<f32>; 3]>, String> {
+    let columns = Columns::of(batch);
+    (0..batch.num_rows()).map(|row| columns.action(row)).collect()
+}
+
 /// A shard to read from.
 #[derive(Debug)]
 pub struct ShardReader {
@@ -281,6 +286,24 @@ impl ShardReader {
         let groups = 0..self.groups.len();
         let skews = groups.map(|group| self.read(group, columns.clone(), &row_skews));
         Ok(skews.collect::<Result<Vec<_>>>()?.concat())
+    }
+
+    /// Row groups.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// Steer, throttle, brake of every row.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parquet`] if the shard is damaged.
+    pub fn actions(&self) -> Result<Vec<[Option<f32>; 3]>> {
+        let columns = ["steer", "throttle", "brake"];
+        let columns = ProjectionMask::columns(self.metadata.parquet_schema(), columns);
+        let groups = 0..self.groups.len();
+        let actions = groups.map(|group| self.read(group, columns.clone(), &row_actions));
+        Ok(actions.collect::<Result<Vec<_>>>()?.concat())
     }
 
     /// The frames of a row group (0 is the first of this shard), each with its episode.

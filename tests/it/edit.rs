@@ -6,6 +6,7 @@ use std::{
     fs,
     os::unix::fs::MetadataExt as _,
     path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
 };
 
 use pmp::{
@@ -40,8 +41,11 @@ fn logs(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The logs, and datasets of the first eight, the others, and all.
+#[derive(Clone)]
 struct Sets {
-    folder: tempfile::TempDir,
+    folder: Arc<tempfile::TempDir>,
+    /// Keeps them there.
+    _originals: Arc<tempfile::TempDir>,
     logs: Vec<PathBuf>,
     first: PathBuf,
     others: PathBuf,
@@ -54,14 +58,21 @@ fn made(out: &Path, logs: &[PathBuf]) {
     assert_eq!(said.code, 0, "{}", said.err);
 }
 
+/// Made once, and only read; the folder for what comes of them is each test's own.
 fn sets() -> Sets {
-    let folder = tempfile::tempdir().unwrap();
+    static SETS: OnceLock<Sets> = OnceLock::new();
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    Sets { folder, ..SETS.get_or_init(make_sets).clone() }
+}
+
+fn make_sets() -> Sets {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
     let logs = logs(folder.path());
     let [first, others, all] = ["first", "others", "all"].map(|name| folder.path().join(name));
     made(&first, &logs[..8]);
     made(&others, &logs[8..]);
     made(&all, &logs);
-    Sets { folder, logs, first, others, all }
+    Sets { _originals: folder.clone(), folder, logs, first, others, all }
 }
 
 impl Sets {
@@ -309,14 +320,19 @@ fn what_does_not_go_together_is_refused_with_what_to_do() {
 fn a_file_that_is_not_what_its_manifest_says_is_named_and_nothing_looks_whole() {
     let sets = sets();
     let file = "frames/split=train/several-00000.parquet";
-    let path = sets.all.join(file);
+    let damaged = sets.out("all");
+    for (name, bytes) in tree(&sets.all) {
+        fs::create_dir_all(damaged.join(&name).parent().unwrap()).unwrap();
+        fs::write(damaged.join(&name), bytes).unwrap();
+    }
+    let path = damaged.join(file);
     let mut bytes = fs::read(&path).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&path, bytes).unwrap();
     for (name, arguments) in [
-        ("taken apart", &["drop", text(&sets.all), "--log", "log-00.mcap"][..]),
-        ("copied", &["resplit", text(&sets.all), "--by-hash"]),
+        ("taken apart", &["drop", text(&damaged), "--log", "log-00.mcap"][..]),
+        ("copied", &["resplit", text(&damaged), "--by-hash"]),
     ] {
         let out = sets.out(name);
         refused(arguments, &out, file, "copy the dataset again");

@@ -1,6 +1,7 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
 mod edit;
+mod export;
 mod report;
 
 use std::process::ExitCode;
@@ -35,6 +36,8 @@ enum Command {
     Drop(edit::Drop),
     /// Make a new dataset with other episodes to train and to judge; prints its identity
     Resplit(edit::Resplit),
+    /// Write a dataset in the layout of other readers
+    Export(export::Export),
 }
 
 const EXAMPLES: &str = "\
@@ -45,6 +48,7 @@ Examples:
   pmp-stats merge monday tuesday --out week
   pmp-stats drop week --log tunnel.mcap --out week-2
   pmp-stats resplit week-2 --val-town Town02 --out week-3
+  pmp-stats export week --format lerobot --out week-lerobot
 
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
@@ -54,6 +58,7 @@ fn main() -> ExitCode {
         (Some(Command::Merge(merge)), _) => edit::run_merge(merge),
         (Some(Command::Drop(drop)), _) => edit::run_drop(drop),
         (Some(Command::Resplit(resplit)), _) => edit::run_resplit(resplit),
+        (Some(Command::Export(export)), _) => export::run(export),
         (None, Some(report)) => report::run(report),
         // Without a command clap wants the arguments of the report.
         (None, None) => Ok(cli::Outcome::Done),
