@@ -28,6 +28,7 @@ mod ahead;
 mod ingest;
 mod collection;
 mod compaction;
+mod card;
 mod memory;
 mod writers;
 mod clocks;
@@ -95,6 +96,10 @@ mod maps;
 mod stats;
 #[cfg(feature = "reports")]
 mod edit;
+#[cfg(feature = "reports")]
+mod lerobot;
+#[cfg(feature = "reports")]
+mod tables_of_frames;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]

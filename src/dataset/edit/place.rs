@@ -13,6 +13,7 @@ use crate::{
     atomic::{self, AtomicFile, sha256_of_file},
     claim::claim,
     dataset::{
+        card::write_card,
         claim::MARKER,
         compaction::{Part, copy_groups, remove_leftovers},
         edit::{
@@ -108,6 +109,7 @@ impl Plan<'_> {
         write_episodes(&out.join("episodes.parquet"), &manifest.logs)?;
         atomic::write_json(&out.join(MARKER), &manifest.config)?;
         remove_leftovers(out, &manifest.logs)?;
+        write_card(out, &manifest)?;
         atomic::write_json(&Manifest::path(out), &manifest)?;
         Ok(Made { manifest, files_kept, files_written })
     }
