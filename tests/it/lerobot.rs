@@ -127,7 +127,10 @@ fn what_is_exported_has_the_documented_layout_and_our_numbers() {
     for (number, stretch) in stretches.iter().enumerate() {
         let episode = &found["episodes"][number];
         assert_eq!(episode["episode_index"], number);
-        assert_eq!((&episode["length"], &episode["pmp/first_frame"]), (&json!(stretch.len()), &json!(stretch[0].index)));
+        assert_eq!(
+            (&episode["length"], &episode["pmp/first_frame"]),
+            (&json!(stretch.len()), &json!(stretch[0].index))
+        );
         assert_eq!(episode["dataset_from_index"], from);
         assert_eq!(episode["dataset_to_index"], from + stretch.len());
         assert_eq!(episode["tasks"], json!(["follow the road"]));

@@ -55,7 +55,8 @@ fn every_reader_finds_our_numbers_with_one_glob() {
     let folder = tempfile::tempdir().unwrap();
     let mut logs = Vec::new();
     for i in 0..6 {
-        let mut log = DriveLog { seconds: 1.0, speed_mps: 4.0 + f64::from(i), ..DriveLog::default() };
+        let mut log =
+            DriveLog { seconds: 1.0, speed_mps: 4.0 + f64::from(i), ..DriveLog::default() };
         // Columns with nulls: of whole drives, and of single frames.
         log.has_lidar = i % 2 == 0;
         log.has_control = i != 3;
