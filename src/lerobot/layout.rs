@@ -25,8 +25,11 @@ pub const ROUTE: &str = "observation.route";
 /// What the driver did.
 pub const ACTION: &str = "action";
 
-/// Channels that an action can have, with what a frame says of them.
-pub const CHANNELS: [(&str, fn(&RecordedAction) -> Option<f32>); 3] = [
+/// A channel of an action: its name, and what a frame says of it.
+pub type Channel = (&'static str, fn(&RecordedAction) -> Option<f32>);
+
+/// Channels that an action can have.
+pub const CHANNELS: [Channel; 3] = [
     ("steer", |action| action.steer),
     ("throttle", |action| action.throttle),
     ("brake", |action| action.brake),

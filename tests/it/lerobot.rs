@@ -77,7 +77,7 @@ fn exported() -> Exported {
     let said = export(&dataset, &out);
     assert_eq!((said.code, said.out.as_str()), (0, ""), "{}", said.err);
     let frames: usize = stretches.iter().map(Vec::len).sum();
-    let wanted = format!("{frames} frames in 3 episodes, cut from 2 at missing frames\n");
+    let wanted = format!("{frames} frames in 3 episodes, cut from 2 where frames are missing\n");
     assert!(said.err.ends_with(&wanted), "{}", said.err);
     assert_eq!(stretches.len(), 3);
     Exported { folder, dataset, out, stretches }

@@ -29,13 +29,12 @@ pub(crate) fn run(export: &Export) -> Result<Outcome> {
     let counts = match export.format {
         Format::Lerobot => lerobot::export::export(&export.dataset, &export.out)?,
     };
-    eprintln!(
-        "{}: {} frames in {} episodes, cut from {} at missing frames",
-        export.out.display(),
-        counts.frames,
-        counts.episodes,
-        counts.drives
-    );
+    let cut = match counts.episodes == counts.drives {
+        true => String::new(),
+        false => format!(", cut from {} where frames are missing", counts.drives),
+    };
+    let (frames, episodes) = (counts.frames, counts.episodes);
+    eprintln!("{}: {frames} frames in {episodes} episodes{cut}", export.out.display());
     if counts.without_action == 0 {
         return Ok(Outcome::Done);
     }
