@@ -27,6 +27,7 @@ Examples:
   pmp-stats data                             one screen
   pmp-stats data --json > stats.json         the same as data
   pmp-stats data --json | jq .splits.train.hours
+  pmp-stats data --html data.html            a page to look at
 
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
