@@ -93,6 +93,8 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "reports")]
+mod stats_page;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]

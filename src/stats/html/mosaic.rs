@@ -3,6 +3,7 @@
 
 use crate::{
     chart::palette::{diverging, escaped, sequential},
+    digits::fixed,
     page::tags::{paragraph, section},
     stats::{
         html::view::{self, HEIGHTS_M, SPEEDS_MPS},
@@ -14,7 +15,7 @@ use crate::{
 const LAYERS: [(&str, &str); 3] = [
     ("lidar", "lidar, by height"),
     ("radar", "radar, by speed"),
-    ("way", "route (white) and 3 s of driving (orange), from above"),
+    ("way", "route and 3 s of driving (orange)"),
 ];
 
 /// Style of the switches: a layer is hidden where its box is not ticked.
@@ -73,7 +74,11 @@ pub fn words(moment: &Moment) -> String {
     words.push(format!("command {}", frame.command.name()));
     let action = frame.action;
     let pedals = [("steer", action.steer), ("throttle", action.throttle), ("brake", action.brake)];
-    words.extend(pedals.iter().filter_map(|(name, x)| x.map(|x| format!("{name} {x:.2}"))));
+    words.extend(
+        pedals
+            .iter()
+            .filter_map(|(name, x)| x.map(|x| format!("{name} {}", fixed(f64::from(x), 2)))),
+    );
     words.join(", ")
 }
 

@@ -34,7 +34,8 @@ input[type=checkbox] { margin: 0 .3rem 0 0; vertical-align: middle; } label { ma
 .coverage td { text-align: center; min-width: 2.2rem; } .coverage th { font-weight: 600; text-align: center; }
 .coverage tbody th, .coverage tfoot th, .coverage td.name { text-align: left; } .coverage .none { color: var(--soft); }
 .coverage tr.first td, .coverage tr.first th { border-top: 2px solid var(--faint); }
-.lead { color: var(--soft); }
+.lead { color: var(--soft); } td + td { white-space: nowrap; }
+@media (max-width: 34rem) { th, td { padding: .2rem .35rem; } }
 ";
 
 /// The page of a dataset as HTML, from the dataset alone.
