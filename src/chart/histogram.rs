@@ -55,7 +55,7 @@ fn highest(shares: &[f64]) -> f64 {
 /// Bars of these heights on equal parts of the axis.
 fn parts(plot: &mut Plot, [left, right]: [f64; 2], low: f64, heights: &[f64], colour: &str) {
     let width = (right - left) / heights.len().max(1) as f64;
-    for (i, height) in heights.iter().enumerate().filter(|(_, height)| **height > low) {
+    for (i, height) in heights.iter().enumerate() {
         let start = left + width * i as f64;
         plot.area_of([start, start + FILLED * width], [low, *height], colour, 1.0);
     }

@@ -95,6 +95,7 @@ mod maps;
 mod stats;
 #[cfg(feature = "reports")]
 mod stats_page;
+mod notebook;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]
