@@ -65,6 +65,10 @@ fn panel(title: &str, sides: &[Vec<[f64; 2]>; 2]) -> String {
             plot.line(points, colour, false);
             plot.note(row, name, colour);
         }
+        // There are few, and a single one is no line.
+        if name == "validation" {
+            points.iter().for_each(|point| plot.dot(*point, None, 0.0, colour));
+        }
     }
     plot.finish()
 }
