@@ -96,6 +96,10 @@ mod stats;
 #[cfg(feature = "reports")]
 mod stats_page;
 mod notebook;
+#[cfg(feature = "checks")]
+mod checks;
+#[cfg(feature = "checks")]
+mod check_faults;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]

@@ -1,10 +1,12 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
+mod check;
+#[cfg(feature = "reports")]
 mod report;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use pmp::cli;
 
 /// Show what is in a dataset, what is missing, and what was left out
@@ -17,9 +19,19 @@ use pmp::cli;
 /// value. A share counts the frames whose value is not null.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
+    #[cfg(feature = "reports")]
     #[command(flatten)]
-    report: report::Report,
+    report: Option<report::Report>,
+
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Check(check::Check),
 }
 
 const EXAMPLES: &str = "\
@@ -28,9 +40,16 @@ Examples:
   pmp-stats data --json > stats.json         the same as data
   pmp-stats data --json | jq .splits.train.hours
   pmp-stats data --html data.html            a page to look at
+  pmp-stats check data                       what would hurt a training run
 
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
 fn main() -> ExitCode {
-    cli::main(|| report::run(&Args::parse().report))
+    cli::main(|| match Args::parse() {
+        Args { command: Some(Command::Check(check)), .. } => check::run(&check),
+        #[cfg(feature = "reports")]
+        Args { report: Some(report), .. } => report::run(&report),
+        // Without a subcommand the report's dataset is required.
+        _ => Args::command().error(ErrorKind::MissingSubcommand, "give a dataset").exit(),
+    })
 }

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! summary ──── amounts, left_out, coverage
+//! verdict ──── findings
 //! survey ───── values, skews, ways, gaps                    ─ page
 //! moments ──── view (a picture with its returns) ─ mosaic, channels
 //! ```
 
 pub mod amounts;
 pub mod left_out;
+pub mod findings;
 pub mod coverage;
 pub mod view;
 pub mod mosaic;

@@ -8,10 +8,12 @@ use crate::{
     error::Result,
     page::document::document,
     stats::{
+        check::verdict::{self, Asked, Verdict},
         html::{
             amounts::amounts,
             channels::channels,
             coverage::coverage,
+            findings::findings,
             gaps::gaps,
             left_out::left_out,
             mosaic::{self, mosaic},
@@ -34,6 +36,8 @@ input[type=checkbox] { margin: 0 .3rem 0 0; vertical-align: middle; } label { ma
 .coverage td { text-align: center; min-width: 2.2rem; } .coverage th { font-weight: 600; text-align: center; }
 .coverage tbody th, .coverage tfoot th, .coverage td.name { text-align: left; } .coverage .none { color: var(--soft); }
 .coverage tr.first td, .coverage tr.first th { border-top: 2px solid var(--faint); }
+.finding { border-left: 4px solid; padding: .1rem .8rem; margin: .6rem 0; background: var(--shade); }
+.finding ul, .finding p { margin: .3rem 0; }
 .lead { color: var(--soft); } td + td { white-space: nowrap; }
 @media (max-width: 34rem) { th, td { padding: .2rem .35rem; } }
 ";
@@ -45,11 +49,13 @@ input[type=checkbox] { margin: 0 .3rem 0 0; vertical-align: middle; } label { ma
 /// If a shard is missing or damaged.
 pub fn page_of(dataset: &Path, summary: &Summary) -> Result<String> {
     let manifest = Manifest::read(dataset)?;
-    Ok(page(summary, &Survey::of(dataset, &manifest)?, &moments(dataset, &manifest)?))
+    let verdict = verdict::check(dataset, &Asked::default())?;
+    let survey = Survey::of(dataset, &manifest)?;
+    Ok(page(summary, &verdict, &survey, &moments(dataset, &manifest)?))
 }
 
 /// The same from its parts.
-pub fn page(summary: &Summary, survey: &Survey, moments: &[Moment]) -> String {
+pub fn page(summary: &Summary, verdict: &Verdict, survey: &Survey, moments: &[Moment]) -> String {
     let dataset = &summary.dataset;
     let lead = format!(
         "<p class=\"lead\"><code>{}</code> at {} Hz, {}</p>\n",
@@ -60,6 +66,7 @@ pub fn page(summary: &Summary, survey: &Survey, moments: &[Moment]) -> String {
     let sections = [
         amounts(summary),
         left_out(summary),
+        findings(verdict),
         coverage(summary),
         mosaic(moments),
         values(survey),
