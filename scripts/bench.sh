@@ -7,6 +7,7 @@
 #   train     a training step and a policy's pass beside PyTorch: CPU time, wall time, memory
 #   loader    the training's loader beside a Python one: samples per CPU second (after ingest)
 #   sensors   the simulated sensors: milliseconds by sensor, steps a second
+#   check     pmp-stats check: milliseconds a dataset, by frames
 #   world     the traffic beside SUMO (flow, speed) and highway-env (steps a second)
 #   all       all of these, one after the other, without options
 #
@@ -21,10 +22,10 @@ cd "$(dirname "$0")/.."
 
 case ${1:-} in
 ingest) shift ;;
-train | loader | sensors | world) what=$1 && shift && exec "scripts/bench_$what.sh" "$@" ;;
+train | loader | sensors | check | world) what=$1 && shift && exec "scripts/bench_$what.sh" "$@" ;;
 all)
     [ $# -eq 1 ] || { echo "error: all takes no options; see --help" >&2; exit 2; }
-    for what in ingest train loader sensors world; do "$0" $what; done
+    for what in ingest train loader sensors check world; do "$0" $what; done
     exit ;;
 esac
 

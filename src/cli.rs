@@ -13,6 +13,8 @@ pub enum Outcome {
     Done,
     /// Done, but something was left out, and the report says what. Exit 3.
     DoneWithLoss,
+    /// Done, and what was judged does not pass; the report says why. Exit 1.
+    Rejected,
 }
 
 /// Run a binary's body, print what went wrong once, and pick the exit code.
@@ -20,6 +22,7 @@ pub fn main(body: impl FnOnce() -> Result<Outcome>) -> ExitCode {
     match body() {
         Ok(Outcome::Done) => ExitCode::from(0),
         Ok(Outcome::DoneWithLoss) => ExitCode::from(3),
+        Ok(Outcome::Rejected) => ExitCode::from(1),
         Err(error) => {
             eprintln!("error: {error}");
             if let Some(hint) = error.hint() {

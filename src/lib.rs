@@ -40,7 +40,7 @@ pub mod chart;
 pub mod page;
 #[cfg(feature = "learning")]
 pub mod model;
-#[cfg(feature = "reports")]
+#[cfg(feature = "checks")]
 pub mod stats;
 pub mod eval;
 pub mod cli;

@@ -51,7 +51,7 @@ fn again(first: Vec<Recorded>, start_ns: i64) -> Vec<Recorded> {
 }
 
 /// A log whose clock begins anew in the middle: two episodes.
-#[cfg(feature = "reports")]
+#[cfg(feature = "checks")]
 pub(crate) fn with_a_jump(folder: &Path, name: &str) -> std::path::PathBuf {
     let messages = again(short().messages(), short().start_ns - ns(30.0));
     let log = folder.join(name);

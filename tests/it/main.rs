@@ -95,10 +95,17 @@ mod maps;
 #[cfg(feature = "reports")]
 mod stats;
 #[cfg(feature = "reports")]
+mod stats_page;
+mod notebook;
+#[cfg(feature = "checks")]
+mod checks;
+#[cfg(feature = "checks")]
+mod check_faults;
+#[cfg(feature = "checks")]
 mod edit;
-#[cfg(feature = "reports")]
+#[cfg(feature = "checks")]
 mod lerobot;
-#[cfg(feature = "reports")]
+#[cfg(feature = "checks")]
 mod tables_of_frames;
 #[cfg(feature = "learning")]
 mod drive_cli;

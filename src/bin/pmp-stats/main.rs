@@ -1,12 +1,14 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
+mod check;
 mod edit;
 mod export;
+#[cfg(feature = "reports")]
 mod report;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand, error::ErrorKind};
 use pmp::cli;
 
 /// Show what is in a dataset, what is missing, and what was left out
@@ -21,6 +23,7 @@ use pmp::cli;
 #[command(version, after_help = EXAMPLES)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Args {
+    #[cfg(feature = "reports")]
     #[command(flatten)]
     report: Option<report::Report>,
 
@@ -30,6 +33,7 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
+    Check(check::Check),
     /// Put datasets together into a new one; prints its identity
     Merge(edit::Merge),
     /// Make a new dataset without some episodes; prints its identity
@@ -45,6 +49,8 @@ Examples:
   pmp-stats data                             one screen
   pmp-stats data --json > stats.json         the same as data
   pmp-stats data --json | jq .splits.train.hours
+  pmp-stats data --html data.html            a page to look at
+  pmp-stats check data                       what would hurt a training run
   pmp-stats merge monday tuesday --out week
   pmp-stats drop week --log tunnel.mcap --out week-2
   pmp-stats resplit week-2 --val-town Town02 --out week-3
@@ -53,14 +59,15 @@ Examples:
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    cli::main(|| match (&args.command, &args.report) {
-        (Some(Command::Merge(merge)), _) => edit::run_merge(merge),
-        (Some(Command::Drop(drop)), _) => edit::run_drop(drop),
-        (Some(Command::Resplit(resplit)), _) => edit::run_resplit(resplit),
-        (Some(Command::Export(export)), _) => export::run(export),
-        (None, Some(report)) => report::run(report),
-        // Without a command clap wants the arguments of the report.
-        (None, None) => Ok(cli::Outcome::Done),
+    cli::main(|| match Args::parse() {
+        Args { command: Some(Command::Check(check)), .. } => check::run(&check),
+        Args { command: Some(Command::Merge(merge)), .. } => edit::run_merge(&merge),
+        Args { command: Some(Command::Drop(drop)), .. } => edit::run_drop(&drop),
+        Args { command: Some(Command::Resplit(resplit)), .. } => edit::run_resplit(&resplit),
+        Args { command: Some(Command::Export(export)), .. } => export::run(&export),
+        #[cfg(feature = "reports")]
+        Args { report: Some(report), .. } => report::run(&report),
+        // Without a subcommand the report's dataset is required.
+        _ => Args::command().error(ErrorKind::MissingSubcommand, "give a dataset").exit(),
     })
 }

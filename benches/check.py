@@ -1,0 +1,90 @@
+"""Time pmp-stats check on parts and repetitions of a dataset; see scripts/bench_check.sh.
+
+A part is a dataset of symbolic links with a manifest of some of the logs. A repetition lists the
+same shards several times under other names: its verdict has findings, its reading is real.
+"""
+
+import argparse
+import copy
+import json
+import os
+import pathlib
+import resource
+import shutil
+import statistics
+import subprocess
+import time
+
+FRAMES = [10_000, 20_000, 40_000, 80_000]
+
+
+def linked(data, folder, frames):
+    """A dataset of about so many frames; the number that it has."""
+    manifest = json.loads((data / "manifest.json").read_text())
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "frames").symlink_to((data / "frames").resolve())
+    logs, count, turn = [], 0, 0
+    while count < frames:
+        for log in manifest["logs"]:
+            if count + log["frames"] / 2 > frames and logs:
+                continue
+            log = copy.deepcopy(log)
+            if turn:
+                log["source_sha256"] = f"{turn}{log['source_sha256']}"
+            logs.append(log)
+            count += log["frames"]
+        turn += 1
+    manifest["logs"], manifest["frames"] = logs, count
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    shutil.copy(data / "episodes.parquet", folder)
+    return count
+
+
+def run(command):
+    """Wall and CPU seconds."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    start = time.perf_counter()
+    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    wall = time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return wall, cpu
+
+
+def measure(command, rounds):
+    """Least wall time and median CPU time, ms, after one run that warms the cache."""
+    run(command)
+    times = [run(command) for _ in range(rounds)]
+    return 1e3 * min(wall for wall, _ in times), 1e3 * statistics.median(cpu for _, cpu in times)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--command", required=True)
+    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--folder", type=pathlib.Path, required=True)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--lerobot", type=pathlib.Path)
+    parser.add_argument("--tools", type=pathlib.Path)
+    options = parser.parse_args()
+
+    print("| frames | reads | wall, ms (least) | CPU, ms | CPU, us a frame |\n|---:|---|---:|---:|---:|")
+    for frames in FRAMES:
+        folder = options.folder / f"check-{frames}"
+        count = linked(options.data, folder, frames)
+        for reads, sample in [("columns", "0"), ("and 48 pictures", "48")]:
+            command = [options.command, "check", str(folder), "--sample", sample]
+            wall, cpu = measure(command, options.rounds)
+            print(f"| {count} | {reads} | {wall:.0f} | {cpu:.0f} | {1e3 * cpu / count:.2f} |", flush=True)
+    if options.lerobot:
+        for name, arguments in [("lecop", []), ("lerobot-doctor", [])]:
+            tool = options.tools / name
+            if not os.access(tool, os.X_OK):
+                print(f"{name}: not installed")
+                continue
+            wall, cpu = measure([str(tool), str(options.lerobot), *arguments], options.rounds)
+            print(f"| {name} | {options.lerobot.name} | {wall:.0f} | {cpu:.0f} | |")
+
+
+main()
