@@ -134,13 +134,11 @@ pub(crate) static FAULTS: &[Fault] = &[
     fault(
         "S10",
         Plant::Manifest(|manifest| {
-            manifest.logs[0].episodes[0].frames -= 1;
-            manifest.logs[0].episodes.push(EpisodeRecord {
-                id: "ep-other".into(),
-                frames: 1,
-                shards: 0,
-                ..manifest.logs[0].episodes[0].clone()
-            });
+            let episodes = &mut manifest.logs[0].episodes;
+            episodes[0].frames -= 1;
+            let id = "ep-other".to_string();
+            let other = EpisodeRecord { id, frames: 1, shards: 0, ..episodes[0].clone() };
+            episodes.push(other);
         }),
     ),
     fault("S11", Shard(|batch| with_words(&batch, "episode", "ep-another"))),
@@ -244,7 +242,7 @@ pub(crate) static FAULTS: &[Fault] = &[
     // At rest, so that no label of a moving car is turned.
     fault("E06", Poses(|cars| cars[0][2].yaw_rad += 1.0)),
     fault("E07", Poses(|cars| cars[0][100].speed_mps += 3.0)),
-    fault("E08", Courses(|courses| courses[0].bend_1pm[120] += 0.25)),
+    fault("E08", Courses(|courses| courses[0].bend_1pm[120] += 0.4)),
     fault(
         "E09",
         Courses(|courses| {
@@ -347,14 +345,14 @@ pub(crate) static FAULTS: &[Fault] = &[
             let frames = first(drives, 0..240);
             let steer: Vec<_> = frames.iter().map(|frame| frame.action.steer).collect();
             for (row, frame) in frames.iter_mut().enumerate() {
-                frame.action.steer = steer[row.saturating_sub(8)];
+                frame.action.steer = steer[row.saturating_sub(10)];
             }
         }),
     ),
     fault(
         "A06",
         Drives(|drives| {
-            let braking = |f: &mut Frame| f.action.brake = f.action.brake.max(Some(0.15));
+            let braking = |f: &mut Frame| f.action.brake = Some(0.15);
             let rows = first(drives, 0..240).iter_mut();
             rows.filter(|f| f.action.throttle > Some(0.25)).take(12).for_each(braking);
         }),
@@ -632,7 +630,7 @@ pub(crate) static FAULTS: &[Fault] = &[
                 course.acceleration_mps2.fill(0.0);
             }
         }),
-        &[("B03", "who always drives at one speed never starts")],
+        &[("B01", "who always drives at one speed never brakes"), ("B03", "and never starts")],
     ),
     fault("B06", Courses(|courses| courses.iter_mut().for_each(|course| course.stand(200)))),
     fault("B07", Courses(|courses| courses[0].go_on(1300))),

@@ -32,7 +32,7 @@ use pmp::{
     drops::Drops,
     frame::{
         Command, Conditions, FUTURE_STEPS, Frame, Future, LidarPixels, RadarPixels, RecordedAction,
-        RouteSource, Skew,
+        Skew,
     },
     log::{mapping::Mapping, profile::Profile},
     projection::Camera,
@@ -91,7 +91,7 @@ impl Course {
                 _ => (std::f64::consts::TAU * (t - 4.5) / 6.0).sin() * -1.5,
             };
             self.acceleration_mps2.push(acceleration);
-            self.bend_1pm.push(0.05 * wave(8.0 + self.seed / 4.0));
+            self.bend_1pm.push(0.05 * wave(16.0 + self.seed / 2.0) + 0.02 * wave(5.0));
         }
         self.steered_1pm = self.bend_1pm.clone();
     }
@@ -577,7 +577,7 @@ fn mixed() -> (tempfile::TempDir, PathBuf) {
         for frame in drives.iter_mut().flat_map(|drive| &mut drive.frames) {
             frame.perturbed = false;
         }
-        drives[0].frames.drain(150..162);
+        drives[0].frames.drain(150..161);
     }));
     let path = root.path().to_path_buf();
     (root, path)
@@ -607,7 +607,7 @@ fn exit_codes_tell_whether_the_set_passes() {
 
 #[test]
 fn an_unknown_code_is_misuse_with_the_nearest_one() {
-    for (wrong, nearest) in [("T2O", "T02 (off-grid)"), ("position-jmp", "E05 (position-jump)")] {
+    for (wrong, nearest) in [("T022", "T02 (off-grid)"), ("position-jmp", "E05 (position-jump)")] {
         let output = pmp_stats(&["check", "data", "--ignore", wrong]);
         assert_eq!((output.status.code(), text(&output.stdout)), (Some(2), ""));
         let stderr = text(&output.stderr);

@@ -121,17 +121,18 @@ pub static SATURATED_CHANNEL: Check = Check {
 const FROZEN_S: f64 = 5.0;
 const FROZEN_BEND_1PM: f64 = 0.02;
 
-/// A pedal that is the same all along an episode of this length, while the car accelerates and
-/// brakes by as much, hangs. Lifting off slows by 0.5 m/s2 at most.
+/// A pedal that is the same all along an episode of this length, while the car accelerates (throttle)
+/// or slows down (brake) by as much over a second, hangs. Downhill and engine braking make less.
 const FROZEN_PEDAL_S: f64 = 10.0;
 const PEDAL_MPS2: f64 = 1.0;
+const BRAKE_MPS2: f64 = 2.0;
 
 pub static FROZEN_CHANNEL: Check = Check {
     code: "A08",
     name: "action-frozen",
     level: Level::Error,
     needs: Needs::Columns,
-    what: "steer is the same to the bit for 5 s while the bend changes by 0.02 1/m, or throttle or brake all along an episode while the car accelerates or brakes by 1 m/s2",
+    what: "steer is the same to the bit for 5 s while the bend changes by 0.02 1/m, or throttle or brake all along an episode while the car accelerates by 1 m/s2 or slows down by 2 m/s2",
     why: "the channel hung, and its value is taught as the answer to everything",
     remedy: "find where the topic stopped; lower the control's tolerance so that the stretch becomes null",
 };
@@ -256,19 +257,19 @@ fn frozen_pedals(track: &Track, motion: &Motion) -> Vec<Finding> {
             / (window as f64 * motion.tick_s)
     });
     let (least, most) = means.fold((0.0_f64, 0.0_f64), |(a, b), mean| (a.min(mean), b.max(mean)));
-    let of_channel = |(channel, moved): (usize, f64)| {
+    let of_channel = |(channel, moved, limit): (usize, f64, f64)| {
         let values = &track.action[channel];
         let first = values.first().copied().flatten()?;
         let is_one = values.iter().all(|value| *value == Some(first));
         let name = CHANNELS[channel];
         let sentence =
             format!("{name} is {first} all along while the speed changes by {moved:.1} m/s2");
-        let hangs = is_one && moved > PEDAL_MPS2 && seconds >= FROZEN_PEDAL_S;
+        let hangs = is_one && moved > limit && seconds >= FROZEN_PEDAL_S;
         let place = Place::episode(&track.episode);
         hangs.then(|| FROZEN_CHANNEL.found(place, f64::from(first), sentence))
     };
-    // Hard braking needs the brake; lifting off and engine braking do not.
-    [(1, most), (2, -least - PEDAL_MPS2)].into_iter().filter_map(of_channel).collect()
+    let channels = [(1, most, PEDAL_MPS2), (2, -least, BRAKE_MPS2)];
+    channels.into_iter().filter_map(of_channel).collect()
 }
 
 /// How well an action fits the motion that many ticks later, for every lag.

@@ -376,7 +376,9 @@ impl Ego<'_> {
 
     fn turns(&self) -> Option<Finding> {
         let beyond = |row: usize| {
-            let size = (self.motion.speed_mps[row] * self.motion.yaw_rate_radps[row]).abs();
+            // The slower of both: a jump of the position, or a wrong unit, is another finding.
+            let speed = self.motion.speed_mps[row].abs().min(self.moved(row));
+            let size = speed * self.motion.yaw_rate_radps[row].abs();
             (size > TYRES_MPS2 && self.yaw_jump(row).is_none()).then_some(size)
         };
         self.steps_beyond(&LATERAL, beyond, |hits| {

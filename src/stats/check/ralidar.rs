@@ -214,7 +214,7 @@ fn astray(lidar: &LidarReturns, sight: &Sight) -> Option<f64> {
         let row = lidar.pixel[*at] as usize / camera.width;
         // At the edge the rounding of half floats may put a point off the picture.
         let edge = OFF_PIXELS as usize;
-        let is_inner = (edge..camera.width - edge).contains(&column)
+        let is_inner = (edge..camera.width.saturating_sub(edge)).contains(&column)
             && (edge..camera.height.saturating_sub(edge)).contains(&row);
         match camera.project(point) {
             None => is_inner,
