@@ -529,7 +529,7 @@ pub(crate) static FAULTS: &[Fault] = &[
         "P07",
         Drives(|drives| {
             let radar = first(drives, 100..101)[0].radar.as_mut().unwrap();
-            drop(radar.speed_mps.as_mut().unwrap().pop());
+            radar.speed_mps.as_mut().unwrap().pop();
         }),
     ),
     fault(
