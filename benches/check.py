@@ -26,14 +26,11 @@ def linked(data, folder, frames):
     (folder / "frames").symlink_to((data / "frames").resolve())
     logs, count, turn = [], 0, 0
     while count < frames:
-        for log in manifest["logs"]:
-            if count + log["frames"] / 2 > frames and logs:
-                continue
-            log = copy.deepcopy(log)
-            if turn:
-                log["source_sha256"] = f"{turn}{log['source_sha256']}"
-            logs.append(log)
-            count += log["frames"]
+        log = copy.deepcopy(manifest["logs"][turn % len(manifest["logs"])])
+        if turn >= len(manifest["logs"]):
+            log["source_sha256"] = f"{turn}{log['source_sha256']}"
+        logs.append(log)
+        count += log["frames"]
         turn += 1
     manifest["logs"], manifest["frames"] = logs, count
     (folder / "manifest.json").write_text(json.dumps(manifest))

@@ -361,7 +361,7 @@ pub(crate) static FAULTS: &[Fault] = &[
         "A07",
         Drives(|drives| {
             let ends = |f: &mut Frame| {
-                f.action.steer = f.action.steer.map(|steer| (steer * 20.0).clamp(-1.0, 1.0));
+                f.action.steer = f.action.steer.map(|steer| (steer * 5.0).clamp(-1.0, 1.0));
             };
             first(drives, 0..240).iter_mut().for_each(ends);
         }),
@@ -529,7 +529,7 @@ pub(crate) static FAULTS: &[Fault] = &[
         "P07",
         Drives(|drives| {
             let radar = first(drives, 100..101)[0].radar.as_mut().unwrap();
-            radar.speed_mps.as_mut().unwrap().pop();
+            radar.speed_mps.as_mut().unwrap().truncate(2);
         }),
     ),
     fault(

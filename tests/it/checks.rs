@@ -9,16 +9,17 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command as Process, Output},
-    sync::OnceLock,
+    sync::{Arc, OnceLock},
 };
 
-use arrow::array::RecordBatch;
+use arrow::{array::RecordBatch, datatypes::Schema};
 use glam::DVec3;
 use half::f16;
 use parquet::arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder};
 use pmp::{
     atomic,
     dataset::{
+        columns,
         drive::Calibration,
         ego::{EgoState, wrap_angle},
         episodes::write_episodes,
@@ -319,9 +320,14 @@ fn rewrite(path: &Path, change: fn(RecordBatch) -> RecordBatch) {
     let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(path).unwrap()).unwrap();
     let batches: Vec<RecordBatch> = reader.build().unwrap().map(|b| change(b.unwrap())).collect();
     let file = fs::File::create(path).unwrap();
-    // As the writer of shards has it: with the version in the schema's metadata.
-    let mut writer = ArrowWriter::try_new(file, batches[0].schema(), Some(properties())).unwrap();
-    batches.iter().for_each(|batch| writer.write(batch).unwrap());
+    // Batches do not keep the version that is in the schema's metadata.
+    let fields = batches[0].schema().fields().clone();
+    let schema = Schema::new_with_metadata(fields, columns::schema().metadata().clone());
+    let schema = Arc::new(schema);
+    let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties())).unwrap();
+    for batch in batches {
+        writer.write(&batch.with_schema(schema.clone()).unwrap()).unwrap();
+    }
     writer.close().unwrap();
 }
 
