@@ -21,6 +21,8 @@ const BATCH: usize = 16;
 const TICKS_PER_S: f64 = 100.0;
 
 fn main() {
+    // As in training: a batch of these is 67 MB, which the kernel would hand out page by page anew.
+    pmp_kernels::buffers::keep_freed_memory();
     let mut args = std::env::args().skip(1).filter(|arg| arg != "--bench");
     let data = args.next().expect("a dataset");
     let mut side = || args.next().map(|side| side.parse().unwrap());

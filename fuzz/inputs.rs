@@ -9,13 +9,15 @@ use std::{fs, path::PathBuf, sync::Arc};
 use pmp::{
     dataset::{
         drive::Drive,
+        picture::{self, jpeg_header::Header},
         ralidar::{lidar_pixels, radar_pixels},
     },
     log::{
         conventions::RadarRule,
         decoder::Decoder,
         definitions,
-        profile::Profile,
+        image::Picture,
+        profile::{CameraRule, Profile},
         reader::{Channel, SchemaRecord},
         signals::{Kind, Pose},
     },
@@ -67,6 +69,23 @@ pub(crate) fn cloud(input: &[u8]) -> bool {
     let _ =
         radar_pixels(Kind::PointCloud, &message, &RadarRule::default(), &Pose::IDENTITY, &camera);
     lidar_pixels(&message, &Pose::IDENTITY, &camera).is_ok()
+}
+
+/// A JPEG, decoded and stored at sizes that shrink it by much and by little, as it is, and enlarged.
+pub(crate) fn jpeg(input: &[u8]) -> bool {
+    // What is large takes as long as it is large: that it is refused beyond a limit is tested.
+    const MOST_PIXELS: usize = 1 << 18;
+    let Ok(Header { width, height, .. }) = Header::read(input) else { return false };
+    if width * height > MOST_PIXELS {
+        return false;
+    }
+    let sizes = [(2, 2), (16, 8), (width, height), (2 * width, 2 * height)];
+    let stored = sizes.map(|(width, height)| {
+        let rule = CameraRule { width, height, ..CameraRule::default() };
+        let decoded = picture::decode(&Picture::Compressed { data: input }, &rule);
+        decoded.and_then(|decoded| decoded.stored(&rule)).is_ok()
+    });
+    stored.contains(&true)
 }
 
 /// An input of a message target: length of the type's name (1 byte), the name, length of the

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Fuzz the readers of foreign bytes: MCAP, CDR, ROS 1, protobuf, JSON, point clouds.
+# Fuzz the readers of foreign bytes: MCAP, CDR, ROS 1, protobuf, JSON, point clouds, JPEG.
 #
 #   fuzz/run.sh [SECONDS [TARGET...]]    all targets, 600 s each, one after the other
 #
@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(mcap cdr ros1 protobuf json cloud)
+[ ${#targets[@]} -gt 0 ] || targets=(mcap cdr ros1 protobuf json cloud jpeg)
 
 # No sanitizer: pmp has no unsafe code, so panics, hangs and memory are what there is to find.
 # The coverage that the fuzzer needs is unstable in name only.

@@ -1,6 +1,6 @@
 """Seeds of the fuzz targets, by writers that are not pmp's: fuzz/corpus/TARGET/seed-*.
 
-    pip install mcap rosbags protobuf foxglove-schemas-protobuf mcap-protobuf-support numpy pillow
+    pip install mcap rosbags protobuf foxglove-schemas-protobuf mcap-protobuf-support numpy pillow opencv-python-headless
     python fuzz/seeds.py
 """
 
@@ -9,6 +9,7 @@ import json
 import pathlib
 import struct
 
+import cv2
 import numpy
 from foxglove_schemas_protobuf import CompressedImage_pb2, FrameTransforms_pb2, PointCloud_pb2
 from foxglove_schemas_protobuf import CameraCalibration_pb2, PoseInFrame_pb2, PosesInFrame_pb2
@@ -182,3 +183,19 @@ for name, schema, message in [
     ("any", {}, {"text": "a\u00e9\n", "deep": [[[[1, 2.5, True, None]]]], "list": [{"a": 1}, {"b": "c"}]}),
 ]:
     save("json", name.split(".")[-1], parts(name, json.dumps(schema).encode(), json.dumps(message).encode()))
+
+# Noise in one half, so that there are numbers and codes of many lengths.
+PIXELS = numpy.random.default_rng(1).integers(0, 256, (24, 40, 3), "uint8")
+PIXELS[:, :20] = 90
+SAMPLING = {"420": 0x221111, "422": 0x211111, "440": 0x121111, "444": 0x111111}
+for name, options in {
+    **{name: [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, factor] for name, factor in SAMPLING.items()},
+    "fine": [cv2.IMWRITE_JPEG_QUALITY, 100],
+    "coarse": [cv2.IMWRITE_JPEG_QUALITY, 10],
+    "own-tables": [cv2.IMWRITE_JPEG_OPTIMIZE, 1],
+    "restarts": [cv2.IMWRITE_JPEG_RST_INTERVAL, 2],
+    "progressive": [cv2.IMWRITE_JPEG_PROGRESSIVE, 1],
+}.items():
+    save("jpeg", name, cv2.imencode(".jpg", PIXELS, options)[1].tobytes())
+save("jpeg", "grey", cv2.imencode(".jpg", PIXELS[:, :, 0])[1].tobytes())
+save("jpeg", "small", jpeg(40))

@@ -10,13 +10,14 @@ type Run = fn(&[u8]) -> bool;
 
 #[test]
 fn no_input_of_the_corpus_panics_and_every_seed_is_understood() {
-    let targets: [(&str, Run); 6] = [
+    let targets: [(&str, Run); 7] = [
         ("mcap", inputs::mcap),
         ("cdr", inputs::cdr),
         ("ros1", inputs::ros1),
         ("protobuf", inputs::protobuf),
         ("json", inputs::json),
         ("cloud", inputs::cloud),
+        ("jpeg", inputs::jpeg),
     ];
     for (target, run) in targets {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
