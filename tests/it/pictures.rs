@@ -476,25 +476,6 @@ fn what_is_written_is_as_near_and_as_short_as_what_a_library_writes() {
 }
 
 #[test]
-fn tables_of_a_picture_s_own_give_the_samples_that_the_usual_ones_give() {
-    let rgb = scene(1280, 720);
-    let planes = |has_own_tables: bool| {
-        let mut file = Vec::new();
-        let mut encoder = Encoder::new(&mut file, 97);
-        encoder.set_sampling_factor(SamplingFactor::F_2_2);
-        encoder.set_optimized_huffman_tables(has_own_tables);
-        encoder.encode(&rgb.data, 1280, 720, ColorType::Rgb).unwrap();
-        let picture = Picture::Compressed { data: &file };
-        let decoded = picture::decode(&picture, &CameraRule::default()).unwrap();
-        let Content::Planes(planes) = decoded.content else { panic!("not shrunk") };
-        (planes, file.len())
-    };
-    let (own, usual) = (planes(true), planes(false));
-    assert!(own.1 < usual.1, "the tables are the same");
-    assert_eq!(own.0, usual.0);
-}
-
-#[test]
 fn a_jpeg_that_lacks_data_inside_is_damaged_although_it_ends_as_it_should() {
     let rgb = scene(320, 240);
     let mut in_runs = Vec::new();
