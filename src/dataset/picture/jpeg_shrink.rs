@@ -20,7 +20,8 @@ use std::{array, f32::consts::FRAC_1_SQRT_2, f64::consts::PI};
 use glam::{Mat4, Vec4};
 
 use crate::dataset::picture::{
-    jpeg_baseline::{Baseline, Block, COEFFICIENTS, Component, ZIGZAG},
+    jpeg_baseline::{Baseline, Block, Component},
+    jpeg_tables::{COEFFICIENTS, ZIGZAG},
     planes::{Plane, Planes},
 };
 
