@@ -6,6 +6,7 @@ use crate::dataset::picture::jpeg_rust as codec;
 use crate::dataset::picture::jpeg_turbo as codec;
 use crate::dataset::picture::{
     jpeg_header::Header,
+    planes::Stored,
     rgb::{Rgb, check_size},
 };
 
@@ -42,4 +43,13 @@ pub fn up_to_end(jpeg: &[u8]) -> Result<&[u8], String> {
 /// A sentence, if the picture is too large for the format.
 pub fn encode(picture: &Rgb, quality: u8) -> Result<Vec<u8>, String> {
     codec::encode(picture, quality)
+}
+
+/// Encode luma and colour differences, quality 1 ... 100.
+///
+/// # Errors
+///
+/// As [`encode`].
+pub fn encode_planes(picture: &Stored, quality: u8) -> Result<Vec<u8>, String> {
+    codec::encode_planes(picture, quality)
 }

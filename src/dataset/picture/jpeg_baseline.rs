@@ -112,6 +112,7 @@ impl<'a> Baseline<'a> {
     /// # Errors
     ///
     /// A sentence: what is wrong with the picture.
+    #[inline(always)]
     pub fn decode<B: Block>(
         &self,
         mut blocks: [B; 3],
@@ -164,7 +165,7 @@ fn read_block(
     block: &mut impl Block,
 ) -> Option<()> {
     bits.fill();
-    let size = bits.symbol(&component.dc, bits.look(&component.dc))?;
+    let size = bits.mean_size(&component.dc)?;
     if size > 11 {
         return None;
     }
@@ -263,7 +264,7 @@ impl Runs<'_> {
 }
 
 /// Where the first byte of 0xff is.
-fn until_ff(bytes: &[u8]) -> Option<usize> {
+pub fn until_ff(bytes: &[u8]) -> Option<usize> {
     // Many at once, where there is none.
     let has_ff = |some: &[u8; 32]| some.iter().fold(false, |found, byte| found | (*byte == 0xff));
     let (pieces, _) = bytes.as_chunks();

@@ -4,8 +4,12 @@
 //! is what decoding a JPEG spends most of its time on. So the chain is kept short: one look into a
 //! table for two codes and the numbers behind them, free of branches that depend on the data.
 
-/// Bits that are looked at together.
-const LOOK_BITS: u32 = 12;
+/// Bits that are looked at together. With one more, two tables would not fit the nearest 48 KB.
+const LOOK_BITS: u32 = 11;
+
+/// Bits that are looked at for the size of a mean's change; a small table, since the large ones need
+/// the room near the processor.
+const MEAN_BITS: u32 = 9;
 
 /// Looks that the bits of one [`Bits::fill`] are enough for.
 pub const LOOKS_A_FILL: usize = 4;
@@ -60,6 +64,8 @@ impl Look {
 #[derive(Clone, Debug)]
 pub struct Codes {
     looks: Box<[Look; 1 << LOOK_BITS]>,
+    /// Symbols of short codes, each with the bits of its code; 0 bits for others.
+    short: Box<[(u8, u8); 1 << MEAN_BITS]>,
     /// By length of the code: codes of up to this length lie below this, left-aligned in 16 bits.
     ends: [u32; 17],
     /// By length: what to add to a code for its place among the symbols.
@@ -76,6 +82,7 @@ impl Codes {
         let mut symbols = [0; 256];
         symbols.get_mut(..listed.len())?.copy_from_slice(listed);
         let mut looks = Box::new([Look::default(); 1 << LOOK_BITS]);
+        let mut short = Box::new([(0, 0); 1 << MEAN_BITS]);
         let (mut ends, mut places) = ([0; 17], [0; 17]);
         let (mut code, mut place) = (0_u32, 0);
         for length in 1..=16 {
@@ -84,6 +91,10 @@ impl Codes {
                 let symbol = *listed.get(place)?;
                 if code >= 1 << length {
                     return None;
+                }
+                if let Some(rest_bits) = MEAN_BITS.checked_sub(length) {
+                    let from = (code << rest_bits) as usize;
+                    short[from..from + (1 << rest_bits)].fill((symbol, length as u8));
                 }
                 if let Some(rest_bits) = LOOK_BITS.checked_sub(length) {
                     let from = (code << rest_bits) as usize;
@@ -106,7 +117,7 @@ impl Codes {
                 *look = look.and(alone[(at << look.bits) % alone.len()]);
             }
         }
-        Some(Codes { looks, ends, places, symbols })
+        Some(Codes { looks, short, ends, places, symbols })
     }
 }
 
@@ -196,6 +207,17 @@ impl<'d> Bits<'d> {
         self.skip(length as u32);
         let place = (next >> (16 - length)) as i32 + codes.places[length];
         codes.symbols.get(place as usize).copied()
+    }
+
+    /// The size of a mean's change; `None` if there is no such code.
+    #[inline(always)]
+    pub fn mean_size(&mut self, codes: &Codes) -> Option<u8> {
+        let (size, length) = codes.short[(self.window >> (64 - MEAN_BITS)) as usize];
+        if length > 0 {
+            self.skip(u32::from(length));
+            return Some(size);
+        }
+        self.symbol(codes, self.look(codes))
     }
 
     /// The next number of `bits` bits, 0 ... 15.

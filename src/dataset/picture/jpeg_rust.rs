@@ -1,4 +1,4 @@
-//! JPEG in Rust alone: decoded by zune-jpeg, encoded by jpeg-encoder.
+//! JPEG in Rust alone: decoded by zune-jpeg; from RGB encoded by jpeg-encoder, from planes by us.
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use zune_jpeg::{
@@ -6,6 +6,7 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
+pub use crate::dataset::picture::jpeg_write::write as encode_planes;
 use crate::dataset::picture::{
     jpeg_header::Header,
     rgb::{MAX_SIDE, Rgb},

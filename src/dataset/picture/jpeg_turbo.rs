@@ -1,8 +1,8 @@
 //! JPEG by libjpeg-turbo.
 
-use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, Subsamp};
+use turbojpeg::{Compressor, Decompressor, Image, PixelFormat, Subsamp, YuvImage};
 
-use crate::dataset::picture::{jpeg_header::Header, rgb::Rgb};
+use crate::dataset::picture::{jpeg_header::Header, planes::Stored, rgb::Rgb};
 
 /// Decode.
 ///
@@ -27,11 +27,29 @@ pub fn decode(jpeg: &[u8], header: Header) -> Result<Rgb, String> {
 /// A sentence, if the picture is too large for the format.
 pub fn encode(picture: &Rgb, quality: u8) -> Result<Vec<u8>, String> {
     let said = |error: turbojpeg::Error| error.to_string();
-    let mut encoder = Compressor::new().map_err(said)?;
-    encoder.set_quality(i32::from(quality)).map_err(said)?;
+    let mut encoder = encoder(quality).map_err(said)?;
     encoder.set_subsamp(Subsamp::Sub2x2).map_err(said)?;
     let Rgb { width, height, ref data } = *picture;
     let rgb =
         Image { pixels: &data[..], width, pitch: 3 * width, height, format: PixelFormat::RGB };
     encoder.compress_to_vec(rgb).map_err(said)
+}
+
+/// Encode luma and colour differences as they are.
+///
+/// # Errors
+///
+/// A sentence, if the picture is too large for the format.
+pub fn encode_planes(picture: &Stored, quality: u8) -> Result<Vec<u8>, String> {
+    let said = |error: turbojpeg::Error| error.to_string();
+    let mut encoder = encoder(quality).map_err(said)?;
+    let Stored { width, height, ref data } = *picture;
+    let planes = YuvImage { pixels: &data[..], width, align: 1, height, subsamp: Subsamp::Sub2x2 };
+    encoder.compress_yuv_to_vec(planes).map_err(said)
+}
+
+fn encoder(quality: u8) -> Result<Compressor, turbojpeg::Error> {
+    let mut encoder = Compressor::new()?;
+    encoder.set_quality(i32::from(quality))?;
+    Ok(encoder)
 }

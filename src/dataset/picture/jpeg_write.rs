@@ -3,7 +3,10 @@
 //! What is stored has the samples of such a JPEG already: no pixel has to become red, green and blue
 //! for an encoder that would make them again.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::dataset::picture::{
+    jpeg_baseline::until_ff,
     jpeg_forward::Factors,
     jpeg_tables::{AC, COEFFICIENTS, DC, Listed, QUANTISERS},
     planes::Stored,
@@ -13,10 +16,9 @@ use crate::dataset::picture::{
 const UNIT: usize = 16;
 const BLOCK: usize = 8;
 
-/// Blocks in a unit, and most bytes of one: each number with its code has 27 bits at most, and any
-/// byte may be one that a zero follows.
+/// Blocks in a unit, and most bytes of one: each number with its code has 27 bits at most.
 const BLOCKS_A_UNIT: usize = 6;
-const MOST_BYTES: usize = 2 * 27 * COEFFICIENTS / 8;
+const MOST_BYTES: usize = 27 * COEFFICIENTS / 8;
 
 /// Most zeros before a coefficient that one code tells of.
 const MOST_ZEROS: usize = 15;
@@ -34,14 +36,14 @@ pub fn write(picture: &Stored, quality: u8) -> Result<Vec<u8>, String> {
     let sides = u16::try_from(picture.width).ok().zip(u16::try_from(picture.height).ok());
     let (width, height) = sides.ok_or("more than 65,535 pixels on a side")?;
     let quantisers = QUANTISERS.map(|table| table.map(|divisor| scaled(divisor, quality)));
-    let mut scan = Scan::new(header(width, height, &quantisers));
+    let mut scan = Scan::default();
     let parts = [0, 1].map(|kind| Part {
         factors: Factors::new(&quantisers[kind]),
         dc: codes(&DC[kind]),
         ac: codes(&AC[kind]),
     });
-    write_units(picture, &parts, &mut scan);
-    Ok(scan.finish())
+    Arch::new().dispatch(Writing { picture, parts: &parts, scan: &mut scan });
+    Ok(scan.finish(header(width, height, &quantisers)))
 }
 
 /// A divisor of quality 50 at another one, as libjpeg scales it.
@@ -107,7 +109,24 @@ fn codes(table: &Listed) -> [Code; 256] {
     codes
 }
 
+/// Writing, to be compiled for each kind of vector unit; what it gives is the same.
+struct Writing<'w> {
+    picture: &'w Stored,
+    parts: &'w [Part; 2],
+    scan: &'w mut Scan,
+}
+
+impl WithSimd for Writing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        write_units(self.picture, self.parts, self.scan);
+    }
+}
+
 /// Unit by unit: four blocks of luma, and one of each colour difference.
+#[inline(always)]
 fn write_units(picture: &Stored, parts: &[Part; 2], scan: &mut Scan) {
     let Stored { width, height, ref data } = *picture;
     let (luma, colour) = picture.lens();
@@ -165,32 +184,28 @@ impl<'p> Rows<'p> {
     }
 }
 
-/// The data of a scan.
+/// The data of a scan, without the zeros that keep a byte of 0xff from being read as a marker.
+#[derive(Default)]
 struct Scan {
     /// All that is written, with room behind it.
-    jpeg: Vec<u8>,
-    /// Bytes that are written.
-    len: usize,
+    data: Vec<u8>,
     bits: Bits,
 }
 
-/// Bits that are not written yet, the newest lowest.
+/// Where writing has come to.
 #[derive(Clone, Copy, Default)]
 struct Bits {
-    waiting: u64,
-    /// How many: fewer than 32.
+    /// Bytes that are whole.
+    bytes: usize,
+    /// Bits behind them, fewer than 8, left-aligned in what has zeros behind them.
     count: u32,
+    started: u64,
 }
 
 impl Scan {
-    /// Begin behind a header.
-    fn new(header: Vec<u8>) -> Scan {
-        Scan { len: header.len(), jpeg: header, bits: Bits::default() }
-    }
-
     /// Make room for so many blocks.
     fn make_room(&mut self, blocks: usize) {
-        self.jpeg.resize(self.len + blocks * MOST_BYTES, 0);
+        self.data.resize(self.bits.bytes + blocks * MOST_BYTES + size_of::<u64>(), 0);
     }
 
     /// Write a block; `mean` is that of the block before it.
@@ -228,46 +243,34 @@ impl Scan {
         self.put(bits, codes[(zeros << 4 | size as usize) & 0xff], number)
     }
 
+    /// Eight bytes are written each time, however many are whole by then: that is sooner done than
+    /// asked.
     #[inline(always)]
     fn put(&mut self, before: Bits, Code { code, bits }: Code, number: u32) -> Bits {
-        let waiting = before.waiting << (bits & 31) | u64::from(code | number);
         let count = before.count + bits;
-        if count < 32 {
-            return Bits { waiting, count };
-        }
-        self.write((waiting >> (count & 31)) as u32);
-        Bits { waiting, count: count - 32 }
-    }
-
-    #[inline(always)]
-    fn write(&mut self, four: u32) {
-        let bytes = four.to_be_bytes();
-        // A byte of 0xff is one of zero in what this is the complement of.
-        let has_ff = (!four).wrapping_sub(0x0101_0101) & four & 0x8080_8080 != 0;
-        if has_ff {
-            bytes.into_iter().for_each(|byte| self.byte(byte));
-        } else {
-            self.jpeg[self.len..][..4].copy_from_slice(&bytes);
-            self.len += 4;
+        let started = before.started | u64::from(code | number) << ((64 - count) & 63);
+        self.data[before.bytes..][..size_of::<u64>()].copy_from_slice(&started.to_be_bytes());
+        Bits {
+            bytes: before.bytes + (count / 8) as usize,
+            count: count % 8,
+            started: started << (count & !7 & 63),
         }
     }
 
-    /// A zero keeps a byte of 0xff from being read as a marker.
-    fn byte(&mut self, byte: u8) {
-        self.jpeg[self.len] = byte;
-        self.len += 1 + usize::from(byte == 0xff);
-    }
-
-    /// The file, its last byte filled up with ones.
-    fn finish(mut self) -> Vec<u8> {
+    /// Behind what is in the file already, the last byte filled up with ones.
+    fn finish(mut self, mut jpeg: Vec<u8>) -> Vec<u8> {
         self.make_room(1);
-        let Bits { waiting, count } = self.bits;
-        let missing = (8 - count % 8) % 8;
-        let rest = ((waiting + 1) << missing) - 1;
-        (0..(count + missing) / 8).rev().for_each(|at| self.byte((rest >> (8 * at)) as u8));
-        self.jpeg.truncate(self.len);
-        self.jpeg.extend([0xff, 0xd9]);
-        self.jpeg
+        let Bits { bytes, .. } = self.put(self.bits, Code { code: 0x7f, bits: 7 }, 0);
+        self.data.truncate(bytes);
+        let mut rest = &self.data[..];
+        while let Some(at) = until_ff(rest) {
+            jpeg.extend_from_slice(&rest[..=at]);
+            jpeg.push(0);
+            rest = &rest[at + 1..];
+        }
+        jpeg.extend_from_slice(rest);
+        jpeg.extend([0xff, 0xd9]);
+        jpeg
     }
 }
 

@@ -13,7 +13,7 @@
 //! ```text
 //! message -> png, webp, raw (bayer, yuv), h264, jpeg of other kinds -> RGB -> scale -> jpeg
 //!         -> jpeg_baseline (jpeg_segments, jpeg_header, jpeg_tables, jpeg_codes) -> jpeg_shrink
-//!            -> planes -> jpeg_write (jpeg_forward)
+//!            -> planes -> jpeg_write (jpeg_forward), or libjpeg-turbo
 //! ```
 
 pub mod rgb;
@@ -153,7 +153,7 @@ impl Decoded<'_> {
             }
             Content::Planes(planes) => {
                 let scaled = planes.resize(area, rule.width, rule.height)?;
-                jpeg_write::write(&scaled, rule.quality)
+                jpeg::encode_planes(&scaled, rule.quality)
             }
             Content::Kept(file) => Ok(file.to_vec()),
         }
