@@ -24,7 +24,7 @@ from cv2 import IMREAD_COLOR, imdecode
 
 # Symbols of the profile, by what they are at work on; the first that fits.
 STAGES = [
-    ("JPEG decoding", r"picture::jpeg_|zune_jpeg|jdhuff|jsimd_(idct|h2v\d_(fancy_)?upsample|ycc)|decode_mcu|^tj.*[dD]ecomp|jpeg_idct|decompress_onepass|h2v\d_fancy"),
+    ("JPEG decoding", r"picture::jpeg_|pulp::|zune_jpeg|jdhuff|jsimd_(idct|h2v\d_(fancy_)?upsample|ycc)|decode_mcu|^tj.*[dD]ecomp|jpeg_idct|decompress_onepass|h2v\d_fancy"),
     ("JPEG encoding", r"jpeg_encoder|jsimd_(fdct|huff|h2v\d_down|quant|rgb|extrgb|conv)|encode_mcu|forward_DCT|compress_data"),
     ("scaling", r"fast_image_resize"),
     ("checksums", r"sha2|crc32"),

@@ -12,3 +12,12 @@ pub fn grouped(number: u64) -> String {
     }
     text
 }
+
+/// With so many decimals and without the sign of a rounded zero.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.into(),
+        _ => text,
+    }
+}

@@ -15,6 +15,7 @@
 pub mod error;
 pub mod digits;
 pub mod atomic;
+pub mod table_file;
 pub mod claim;
 pub mod remote;
 pub mod projection;
@@ -27,6 +28,7 @@ pub mod footprint;
 pub mod policy;
 pub mod control;
 pub mod dataset;
+pub mod lerobot;
 pub mod map;
 pub mod towns;
 pub mod world;

@@ -191,7 +191,7 @@ impl<'c, T: Copy> Nearest<'c, T> {
 
     /// Ascending by pixel.
     pub fn finish(mut self) -> impl Iterator<Item = (u32, T)> {
-        self.hits.sort();
+        self.hits.sort_unstable();
         let Nearest { hits, returns, .. } = self;
         let mut at = 0;
         std::iter::from_fn(move || {

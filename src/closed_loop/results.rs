@@ -12,18 +12,14 @@ use arrow::{
     },
     datatypes::{DataType, Field, Float64Type, Schema, UInt32Type, UInt64Type},
 };
-use parquet::{
-    arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
-    basic::{Compression, ZstdLevel},
-    file::{metadata::KeyValue, properties::WriterProperties},
-};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::{
-    atomic::AtomicFile,
     closed_loop::row::EpisodeRow,
     error::{Error, Result},
+    table_file::write_batches,
 };
 
 /// Name of the file in the directory of an evaluation.
@@ -144,16 +140,7 @@ pub fn write(path: &Path, rows: &[EpisodeRow]) -> Result<()> {
     }
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(Error::arrow(path))?;
-    let version = KeyValue::new(VERSION_KEY.to_string(), SCHEMA_VERSION.to_string());
-    let properties = WriterProperties::builder()
-        .set_created_by(concat!("pmp ", env!("CARGO_PKG_VERSION")).to_string())
-        .set_key_value_metadata(Some(vec![version]))
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .build();
-    let mut writer = ArrowWriter::try_new(AtomicFile::create(path)?, schema, Some(properties))
-        .map_err(Error::parquet(path))?;
-    writer.write(&batch).map_err(Error::parquet(path))?;
-    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
+    write_batches(path, schema, [Ok(batch)], &[(VERSION_KEY, SCHEMA_VERSION.to_string())])?;
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use std::{
 
 use crate::{
     atomic::{self, UNFINISHED, unfinished_name},
-    dataset::manifest::{IngestConfig, Manifest},
+    dataset::manifest::{EDIT, IngestConfig, Manifest},
     error::{Error, Result},
 };
 
@@ -43,6 +43,12 @@ impl Claim {
             let (path, what, hint) = (out.to_path_buf(), what.to_string(), Some(hint.to_string()));
             Err(Error::Dataset { path, what, hint })
         };
+        if out.join(EDIT).exists() && !Manifest::path(out).exists() {
+            return refuse(
+                "an unfinished dataset that `pmp-stats` makes of others",
+                "give the same `pmp-stats` command again to finish it, or choose another --out",
+            );
+        }
         let path = out.join(MARKER);
         if !path.exists() {
             if !is_free(out)? {

@@ -225,6 +225,17 @@ impl<'b> Columns<'b> {
         self.fixed::<Float32Type, 2>("velocity", row)
     }
 
+    /// Sample time minus grid time.
+    pub fn skew(&self, row: usize) -> Result<Skew, String> {
+        let number = |name: &str| self.number::<Int32Type>(name, row);
+        Ok(Skew {
+            image_ns: number("image_skew")?.unwrap_or_default(),
+            lidar_ns: number("lidar_skew")?,
+            radar_ns: number("radar_skew")?,
+            control_ns: number("control_skew")?,
+        })
+    }
+
     fn word(&self, name: &str, row: usize) -> Result<String, String> {
         self.text(name, row)?.ok_or(format!("column `{name}` has a null"))
     }
@@ -271,12 +282,7 @@ impl<'b> Columns<'b> {
                 xy_m: self.fixed::<Float32Type, { 2 * FUTURE_STEPS }>("future_xy", row)?,
                 len: self.number::<UInt8Type>("future_len", row)?.unwrap_or_default(),
             },
-            skew: Skew {
-                image_ns: self.number::<Int32Type>("image_skew", row)?.unwrap_or_default(),
-                lidar_ns: self.number::<Int32Type>("lidar_skew", row)?,
-                radar_ns: self.number::<Int32Type>("radar_skew", row)?,
-                control_ns: self.number::<Int32Type>("control_skew", row)?,
-            },
+            skew: self.skew(row)?,
             conditions: Conditions {
                 town: self.text("town", row)?,
                 weather: self.text("weather", row)?,

@@ -6,7 +6,8 @@
 
 use std::{
     fs::{self, File},
-    path::Path,
+    ops::Range,
+    path::{Path, PathBuf},
 };
 
 use parquet::{
@@ -19,7 +20,7 @@ use parquet::{
 };
 
 use crate::{
-    atomic::AtomicFile,
+    atomic::{AtomicFile, Committed},
     dataset::{
         manifest::LogRecord,
         shard::{ROWS_PER_SHARD, ShardRecord, properties},
@@ -29,10 +30,10 @@ use crate::{
 };
 
 /// Shards with fewer rows are put together with others.
-const SMALL_ROWS: u64 = ROWS_PER_SHARD as u64 / 2;
+pub const SMALL_ROWS: u64 = ROWS_PER_SHARD as u64 / 2;
 
 /// First part of the names of files that hold the shards of several logs.
-const PREFIX: &str = "several-";
+pub const PREFIX: &str = "several-";
 
 /// Put small shards of each split together, in the order of the episodes, and let the records
 /// name the files that then hold them. The small files stay until [`remove_leftovers`].
@@ -109,31 +110,76 @@ fn for_each_shard(dataset: &Path, mut on: impl FnMut(&Path, &str) -> Result<()>)
 }
 
 fn merge(dataset: &Path, name: &str, shards: &mut [&mut ShardRecord]) -> Result<()> {
-    let path = dataset.join(name);
-    let open = |shard: &ShardRecord| {
-        let path = dataset.join(&shard.path);
-        let file = File::open(&path).map_err(Error::io("open", &path))?;
-        let reader = file.try_clone().map_err(Error::io("open", &path))?;
-        let reader = SerializedFileReader::new(reader).map_err(Error::parquet(&path))?;
-        Ok::<_, Error>((file, reader))
+    let parts: Vec<Part> = shards.iter().map(|shard| Part::of(dataset, shard)).collect();
+    let (committed, groups) = copy_groups(&dataset.join(name), &parts)?;
+    for (shard, groups) in shards.iter_mut().zip(groups) {
+        shard.path = name.to_string();
+        shard.bytes = committed.bytes;
+        shard.sha256.clone_from(&committed.sha256);
+        shard.groups = Some([groups.start, groups.len()]);
+    }
+    Ok(())
+}
+
+/// Row groups of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    pub path: PathBuf,
+    /// `None` is all.
+    pub groups: Option<Range<usize>>,
+}
+
+impl Part {
+    /// The row groups of a shard of a dataset.
+    pub fn of(dataset: &Path, shard: &ShardRecord) -> Part {
+        let groups = shard.groups.map(|[first, count]| first..first.saturating_add(count));
+        Part { path: dataset.join(&shard.path), groups }
+    }
+
+    fn open(&self) -> Result<(File, SerializedFileReader<File>)> {
+        let file = File::open(&self.path).map_err(Error::io("open", &self.path))?;
+        let reader = file.try_clone().map_err(Error::io("open", &self.path))?;
+        let reader = SerializedFileReader::new(reader).map_err(Error::parquet(&self.path))?;
+        Ok((file, reader))
+    }
+}
+
+/// Write one shard of the row groups of others, byte for byte as they lie there, in their order;
+/// gives the row groups that each part became. The first part says what the footer says.
+///
+/// # Errors
+///
+/// If the disk refuses, there is no part, or a file has not the row groups.
+pub fn copy_groups(path: &Path, parts: &[Part]) -> Result<(Committed, Vec<Range<usize>>)> {
+    let damaged = |path: &Path, what: &str| Error::Dataset {
+        path: path.to_path_buf(),
+        what: what.to_string(),
+        hint: Some("copy the dataset again, or ingest the logs again".to_string()),
     };
-    let (_, first) = open(shards[0])?;
+    let first = parts.first().ok_or_else(|| damaged(path, "a shard of nothing"))?;
+    let (_, first) = first.open()?;
     let first = first.metadata().file_metadata();
     let properties = WriterPropertiesBuilder::from(properties())
         .set_key_value_metadata(first.key_value_metadata().cloned())
         .build();
     let schema = first.schema_descr().root_schema_ptr();
     let mut writer =
-        SerializedFileWriter::new(AtomicFile::create(&path)?, schema, properties.into())
-            .map_err(Error::parquet(&path))?;
-    let mut ranges = Vec::with_capacity(shards.len());
-    for shard in &*shards {
-        let (file, reader) = open(shard)?;
-        let groups = reader.metadata().row_groups();
+        SerializedFileWriter::new(AtomicFile::create(path)?, schema, properties.into())
+            .map_err(Error::parquet(path))?;
+    let mut ranges = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (file, reader) = part.open()?;
+        let all = reader.metadata().row_groups();
+        let groups = match &part.groups {
+            None => all,
+            Some(range) => all
+                .get(range.clone())
+                .ok_or_else(|| damaged(&part.path, "fewer row groups than the manifest names"))?,
+        };
         let first_group = writer.flushed_row_groups().len();
-        ranges.push((first_group, groups.len()));
+        ranges.push(first_group..first_group + groups.len());
         for group in groups {
-            let mut copy = writer.next_row_group().map_err(Error::parquet(&path))?;
+            let mut copy = writer.next_row_group().map_err(Error::parquet(path))?;
             for column in group.columns() {
                 let closed = ColumnCloseResult {
                     bytes_written: column.compressed_size() as u64,
@@ -143,17 +189,10 @@ fn merge(dataset: &Path, name: &str, shards: &mut [&mut ShardRecord]) -> Result<
                     column_index: None,
                     offset_index: None,
                 };
-                copy.append_column(&file, closed).map_err(Error::parquet(&path))?;
+                copy.append_column(&file, closed).map_err(Error::parquet(path))?;
             }
-            copy.close().map_err(Error::parquet(&path))?;
+            copy.close().map_err(Error::parquet(path))?;
         }
     }
-    let committed = writer.into_inner().map_err(Error::parquet(&path))?.commit()?;
-    for (shard, (first_group, groups)) in shards.iter_mut().zip(ranges) {
-        shard.path = name.to_string();
-        shard.bytes = committed.bytes;
-        shard.sha256.clone_from(&committed.sha256);
-        shard.groups = Some([first_group, groups]);
-    }
-    Ok(())
+    Ok((writer.into_inner().map_err(Error::parquet(path))?.commit()?, ranges))
 }

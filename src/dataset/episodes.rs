@@ -2,6 +2,15 @@
 
 use std::{path::Path, sync::Arc};
 
+use crate::{
+    dataset::{
+        account::TopicAccount,
+        manifest::{EpisodeRecord, LogRecord},
+    },
+    drops::Reason,
+    error::{Error, Result},
+    table_file::write_batches,
+};
 use arrow::{
     array::{
         Array, ArrayRef, Float64Array, ListArray, RecordBatch, StringArray, StructArray,
@@ -9,21 +18,6 @@ use arrow::{
     },
     buffer::OffsetBuffer,
     datatypes::{Field, Fields, Schema},
-};
-use parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
-
-use crate::{
-    atomic::AtomicFile,
-    dataset::{
-        account::TopicAccount,
-        manifest::{EpisodeRecord, LogRecord},
-    },
-    drops::Reason,
-    error::{Error, Result},
 };
 
 /// Columns that may be null.
@@ -71,14 +65,7 @@ pub fn write_episodes(path: &Path, logs: &[LogRecord]) -> Result<()> {
     let columns = columns.into_iter().map(|(_, column)| column).collect();
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(schema.clone(), columns).map_err(Error::arrow(path))?;
-    let properties = WriterProperties::builder()
-        .set_created_by(concat!("pmp ", env!("CARGO_PKG_VERSION")).to_string())
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .build();
-    let mut writer = ArrowWriter::try_new(AtomicFile::create(path)?, schema, Some(properties))
-        .map_err(Error::parquet(path))?;
-    writer.write(&batch).map_err(Error::parquet(path))?;
-    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
+    write_batches(path, schema, [Ok(batch)], &[])?;
     Ok(())
 }
 

@@ -4,7 +4,7 @@
 //! DATASET/ingest.json                     the configuration, written first
 //! DATASET/frames/split=*/EPISODE-*.parquet   the shards of a log ...
 //! DATASET/logs/EPISODE.json               ... and then its record: the log is committed
-//! DATASET/episodes.parquet, manifest.json put together from the records, last
+//! DATASET/episodes.parquet, README.md, manifest.json   put together from the records, last
 //! ```
 //!
 //! Killed at any moment and started again, it skips the logs that are committed and makes the
@@ -24,6 +24,7 @@ use crate::{
     dataset::{
         account,
         ahead::Ahead,
+        card::write_card,
         claim::Claim,
         compaction::{compact, remove_leftovers},
         drive::Drive,
@@ -112,6 +113,7 @@ pub fn ingest(
     compact(out, &mut committed)?;
     let manifest = Manifest::new(config.clone(), committed, plan.failed);
     write_episodes(&out.join("episodes.parquet"), &manifest.logs)?;
+    write_card(out, &manifest)?;
     atomic::write_json(&Manifest::path(out), &manifest)?;
     remove_leftovers(out, &manifest.logs)?;
     Ok(manifest)

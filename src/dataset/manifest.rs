@@ -153,6 +153,42 @@ pub struct FailedLog {
     pub error: String,
 }
 
+/// How a dataset was made of others; written first, as `edit.json`, and kept in the manifest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Edit {
+    #[serde(flatten)]
+    pub change: Change,
+    /// What it was made of, ascending by identity.
+    pub of: Vec<Origin>,
+}
+
+/// What an edit did.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Change {
+    /// Put several datasets together.
+    Merge,
+    /// Left out these episodes, ascending.
+    Drop { episodes: Vec<String> },
+    /// Moved logs, by the id of their first episode, to the other side by a rule.
+    Resplit { rule: String, moved: Vec<String> },
+}
+
+/// A dataset that another was made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    pub identity: String,
+    pub written_by: String,
+    pub frames: u64,
+    pub config: IngestConfig,
+    /// Where it was made of others itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edit: Option<Box<Edit>>,
+}
+
+/// Name of the file that says so while a dataset is made of others, and after.
+pub const EDIT: &str = "edit.json";
+
 /// `manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
@@ -164,6 +200,9 @@ pub struct Manifest {
     pub logs: Vec<LogRecord>,
     pub failed: Vec<FailedLog>,
     pub frames: u64,
+    /// Where it was made of other datasets and not of logs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edit: Option<Edit>,
 }
 
 impl Manifest {
@@ -172,7 +211,7 @@ impl Manifest {
         logs.sort_by(|a, b| a.episode.cmp(&b.episode));
         let frames = logs.iter().map(|log| log.frames).sum();
         let written_by = concat!("pmp ", env!("CARGO_PKG_VERSION")).to_string();
-        Manifest { version: DATASET_VERSION, written_by, config, logs, failed, frames }
+        Manifest { version: DATASET_VERSION, written_by, config, logs, failed, frames, edit: None }
     }
 
     /// Where the manifest of a dataset is.
@@ -188,12 +227,17 @@ impl Manifest {
     pub fn read(dataset: &Path) -> Result<Manifest> {
         let path = Manifest::path(dataset);
         if !path.exists() {
-            let (what, hint) = match dataset.join("ingest.json").exists() {
-                true => (
+            let has = |name: &str| dataset.join(name).exists();
+            let (what, hint) = match (has(EDIT), has("ingest.json")) {
+                (true, _) => (
+                    "an unfinished dataset",
+                    "give the same `pmp-stats` command again to finish it, or remove the folder",
+                ),
+                (false, true) => (
                     "an unfinished dataset",
                     "give the same `pmp-ingest` command again to finish it",
                 ),
-                false => (
+                (false, false) => (
                     "not a dataset: it has no manifest.json",
                     "make one with `pmp-ingest --out DATASET LOG...`",
                 ),
@@ -212,12 +256,18 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// A short name for exactly this data: a hash over all shards.
+    /// A short name for exactly this data: a hash over all shards, and over the side of each log
+    /// that is not on the side where the hash of its id puts it.
     pub fn identity(&self) -> String {
         use sha2::{Digest, Sha256};
         let mut hasher = Sha256::new();
-        for shard in self.logs.iter().flat_map(|log| &log.shards) {
-            hasher.update(shard.sha256.as_bytes());
+        for log in &self.logs {
+            for shard in &log.shards {
+                hasher.update(shard.sha256.as_bytes());
+            }
+            if log.split != Split::of(&log.episode) {
+                hasher.update(log.split.name().as_bytes());
+            }
         }
         crate::atomic::hex(&hasher.finalize())[..16].to_string()
     }

@@ -7,7 +7,8 @@
 //!            ahead: what frames need, made during the scan and kept in stock
 //! episode: a drive made and written; record: of all of a log's; claim: who writes; account: what became of its messages; skew
 //! logs: given or found, here or in a store; plan: which are the work, told apart by their bytes
-//! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, summary, inspect
+//! ingest: one log after the other, each committed alone; publish: a whole dataset sent to a store; split, manifest, episodes, card, summary, inspect
+//! edit: datasets made of datasets (merge, drop, resplit), each a whole new one
 //! open (which frames train, which judge; traits: what kind of moment each is)
 //!   -> balance -> order -> sample -> augment -> batch, by loader
 //! ```
@@ -44,6 +45,7 @@ pub mod account;
 pub mod skew;
 pub mod manifest;
 pub mod episodes;
+pub mod card;
 pub mod summary;
 pub mod episode;
 pub mod record;
@@ -54,6 +56,7 @@ pub mod ingest_event;
 pub mod plan;
 pub mod ingest;
 pub mod publish;
+pub mod edit;
 pub mod inspect;
 pub mod open;
 pub mod balance;

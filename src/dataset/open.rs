@@ -91,6 +91,7 @@ impl Dataset {
     /// If the folder is no finished dataset, or a shard is missing or damaged.
     pub fn open(path: &Path) -> Result<Dataset> {
         let manifest = Manifest::read(path)?;
+        let logs = manifest.logs.clone();
         let sides: Vec<Split> = manifest.logs.iter().map(|log| log.split).collect();
         let has = |split| sides.contains(&split);
         let mut dataset = Dataset {
@@ -100,11 +101,13 @@ impl Dataset {
             train: Part::default(),
             val: Part::default(),
             holdout: Holdout {
-                how: "episodes, by a hash of their id, 7 : 1".to_string(),
+                how: match logs.iter().all(|log| log.split == Split::of(&log.episode)) {
+                    true => "episodes, by a hash of their id, 7 : 1".to_string(),
+                    false => "episodes, on the sides that the manifest says".to_string(),
+                },
                 is_time_block: false,
             },
         };
-        let logs = dataset.manifest.logs.clone();
         if let [log] = logs.as_slice() {
             dataset.cut_in_time(log)?;
         } else {

@@ -31,7 +31,7 @@ use crate::{
         traits::Traits,
     },
     error::{Error, Result},
-    frame::Frame,
+    frame::{Frame, Skew},
 };
 
 /// Frames in a row group.
@@ -207,6 +207,18 @@ fn row_ticks(batch: &RecordBatch) -> Result<Vec<RowTick>, String> {
     (0..batch.num_rows()).map(tick).collect()
 }
 
+const SKEW_COLUMNS: [&str; 4] = ["image_skew", "lidar_skew", "radar_skew", "control_skew"];
+
+fn row_skews(batch: &RecordBatch) -> Result<Vec<Skew>, String> {
+    let columns = Columns::of(batch);
+    (0..batch.num_rows()).map(|row| columns.skew(row)).collect()
+}
+
+fn row_actions(batch: &RecordBatch) -> Result<Vec<[Option<f32>; 3]>, String> {
+    let columns = Columns::of(batch);
+    (0..batch.num_rows()).map(|row| columns.action(row)).collect()
+}
+
 /// A shard to read from.
 #[derive(Debug)]
 pub struct ShardReader {
@@ -262,6 +274,36 @@ impl ShardReader {
         let columns = ProjectionMask::columns(schema, TICK_COLUMNS);
         let groups = 0..self.groups.len();
         groups.map(|group| self.read(group, columns.clone(), &row_ticks)).collect()
+    }
+
+    /// Sample time minus grid time of every row.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parquet`] if the shard is damaged.
+    pub fn skews(&self) -> Result<Vec<Skew>> {
+        let columns = ProjectionMask::columns(self.metadata.parquet_schema(), SKEW_COLUMNS);
+        let groups = 0..self.groups.len();
+        let skews = groups.map(|group| self.read(group, columns.clone(), &row_skews));
+        Ok(skews.collect::<Result<Vec<_>>>()?.concat())
+    }
+
+    /// Row groups.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// Steer, throttle, brake of every row.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parquet`] if the shard is damaged.
+    pub fn actions(&self) -> Result<Vec<[Option<f32>; 3]>> {
+        let columns = ["steer", "throttle", "brake"];
+        let columns = ProjectionMask::columns(self.metadata.parquet_schema(), columns);
+        let groups = 0..self.groups.len();
+        let actions = groups.map(|group| self.read(group, columns.clone(), &row_actions));
+        Ok(actions.collect::<Result<Vec<_>>>()?.concat())
     }
 
     /// The frames of a row group (0 is the first of this shard), each with its episode.

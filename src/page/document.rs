@@ -17,7 +17,7 @@ code { font-size: .92em; } td code, th code { white-space: nowrap; } small { col
 .verdicts li { margin: .3rem 0; } .basis { color: var(--soft); font-size: .9em; }
 .legend { position: sticky; top: 0; background: var(--paper); padding: .4rem 0; }
 .legend span { white-space: nowrap; margin-right: 1rem; } .legend .mark { margin: 0; }
-.charts { display: flex; flex-wrap: wrap; gap: .5rem; }
+.charts { display: flex; flex-wrap: wrap; gap: .5rem; align-items: flex-start; }
 .charts svg { max-width: 100%; height: auto; } .paper { fill: none; } .grid { stroke: var(--faint); }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9em; margin: .5rem 0; }

@@ -1,24 +1,13 @@
 //! Questions to the shards and to `episodes.parquet`, asked through polars.
 //!
-//! The shards and their split are those of the manifest: what a killed ingest left behind does
-//! not count, and a dataset may lie below a folder that looks like a hive partition. Only scalar
-//! columns and the velocity are read: that a frame has lidar or radar is known from its skew,
-//! which is null exactly where they are. Polars still looks at the types of all columns, so it has
-//! to be built with half floats.
+//! Only scalar columns and the velocity are read: that a frame has lidar or radar is known from its
+//! skew, which is null exactly where they are.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    fs, iter,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, iter, path::Path};
 
-use polars::{
-    io::HiveOptions,
-    prelude::{
-        DataFrame, DataType, Expr, Field, IntoLazy as _, LazyFrame, PlRefPath, PolarsResult,
-        QuantileMethod, ScanArgsParquet, ScanSources, Schema, UnionArgs, col, concat, len, lit,
-        when,
-    },
+use polars::prelude::{
+    DataFrame, DataType, Expr, Field, IntoLazy as _, LazyFrame, PolarsResult, QuantileMethod,
+    Schema, col, len, lit, when,
 };
 
 use crate::{
@@ -29,10 +18,13 @@ use crate::{
     },
     drops::Reason,
     error::{Error, Result},
-    frame::{Command, FUTURE_STEPS, RouteSource},
-    stats::summary::{
-        Dataset, Distribution, Group, Groups, Holdout, LeftOut, Loss, Part, Quantiles, Shares,
-        Signals, Skew, Skews, Splits, Summary, VERSION,
+    frame::{Command, Conditions, FUTURE_STEPS, RouteSource},
+    stats::{
+        frames,
+        summary::{
+            Combination, Dataset, Distribution, Group, Groups, Holdout, LeftOut, Loss, Part,
+            Quantiles, Shares, Signals, Skew, Skews, Splits, Summary, VERSION,
+        },
     },
 };
 
@@ -48,8 +40,6 @@ const VALUES: [&str; 8] = [
     "control_skew",
 ];
 
-const NS_PER_MS: f64 = 1e6;
-
 /// Summarise a dataset.
 ///
 /// # Errors
@@ -58,15 +48,15 @@ const NS_PER_MS: f64 = 1e6;
 /// manifest says; [`Error::Query`] if a file in it is damaged.
 pub fn summarise(dataset: &Path) -> Result<Summary> {
     let manifest = Manifest::read(dataset)?;
-    let frames = read_frames(dataset, &manifest)?;
-    let all = Answers::of(frames.clone()).map_err(Error::query(dataset))?;
+    let rows = read_frames(dataset, &manifest)?;
+    let all = Answers::of(rows.clone()).map_err(Error::query(dataset))?;
     if all.frames != manifest.frames {
         let what =
             format!("the shards hold {} frames, the manifest says {}", all.frames, manifest.frames);
-        return Err(broken(dataset, what));
+        return Err(frames::broken(dataset, what));
     }
     let of_split = |split: Split| -> Result<Option<Part>> {
-        let rows = frames.clone().filter(col("split").eq(lit(split.name())));
+        let rows = rows.clone().filter(col("split").eq(lit(split.name())));
         let answers = Answers::of(rows).map_err(Error::query(dataset))?;
         Ok(part(&manifest, &answers, |log| log.split == split))
     };
@@ -97,7 +87,8 @@ pub fn summarise(dataset: &Path) -> Result<Summary> {
             radar: all.skew("radar_skew"),
             control: all.skew("control_skew"),
         },
-        groups: groups(dataset, frames)?,
+        groups: groups(dataset, rows)?,
+        coverage: coverage(&manifest),
         holdout: holdout(dataset)?,
         left_out: left_out(&manifest),
     })
@@ -105,39 +96,14 @@ pub fn summarise(dataset: &Path) -> Result<Summary> {
 
 /// The columns that are asked about, one row a frame; every value as f64, null where absent.
 fn read_frames(dataset: &Path, manifest: &Manifest) -> Result<LazyFrame> {
-    for shard in manifest.logs.iter().flat_map(|log| &log.shards) {
-        let path = dataset.join(&shard.path);
-        match fs::metadata(&path) {
-            Ok(metadata) if metadata.len() == shard.bytes => (),
-            Ok(_) => return Err(broken(&path, "a shard is not as long as it was".to_string())),
-            Err(error) => return Err(broken(&path, format!("a shard cannot be read ({error})"))),
-        }
-    }
     let number = |name: &str| col(name).cast(DataType::Float64);
-    let axis = |i: i32| col("velocity").arr().get(lit(i), false).cast(DataType::Float64);
-    let speed = (axis(0) * axis(0) + axis(1) * axis(1)).sqrt();
     let mut columns = vec![col("command"), col("route_source")];
     columns.push(col("future_len").eq(lit(FUTURE_STEPS as u32)).alias("full_future"));
-    columns.push(speed.alias(VALUES[0]));
+    columns.push(frames::speed_mps().alias(VALUES[0]));
     columns.extend(VALUES[1..4].iter().map(|name| number(name)));
-    columns.extend(VALUES[4..].iter().map(|name| number(name) / lit(NS_PER_MS)));
-    let tables = || -> PolarsResult<DataFrame> {
-        let mut tables = vec![no_frames().lazy()];
-        for split in Split::ALL {
-            let logs = manifest.logs.iter().filter(|log| log.split == split);
-            // A file may hold shards of several logs.
-            let shards: BTreeSet<_> =
-                logs.flat_map(|log| &log.shards).map(|shard| &shard.path).collect();
-            if !shards.is_empty() {
-                let mut columns = columns.clone();
-                columns.insert(0, lit(split.name()).alias("split"));
-                let paths = shards.iter().map(|path| dataset.join(path));
-                tables.push(scan(paths)?.select(columns));
-            }
-        }
-        concat(tables, UnionArgs::default())?.collect()
-    };
-    tables().map(DataFrame::lazy).map_err(Error::query(dataset))
+    columns.extend(VALUES[4..].iter().map(|name| frames::skew_ms(name)));
+    let table = frames::select(dataset, manifest, &columns)?;
+    Ok(table.unwrap_or_else(no_frames).lazy())
 }
 
 /// The table of no shard at all.
@@ -149,18 +115,6 @@ fn no_frames() -> DataFrame {
     let schema: Schema =
         fields.map(|(name, data_type)| Field::new(name.into(), data_type)).collect();
     DataFrame::empty_with_schema(&schema)
-}
-
-/// Exactly these files, whatever characters their names have.
-fn scan(paths: impl Iterator<Item = PathBuf>) -> PolarsResult<LazyFrame> {
-    let paths: Vec<PlRefPath> =
-        paths.map(|path| PlRefPath::try_from_path(&path)).collect::<PolarsResult<_>>()?;
-    let args = ScanArgsParquet {
-        hive_options: HiveOptions::new_disabled(),
-        glob: false,
-        ..Default::default()
-    };
-    LazyFrame::scan_parquet_sources(ScanSources::Paths(paths.into()), args)
 }
 
 /// What was answered about some rows.
@@ -268,14 +222,14 @@ fn part(
     })
 }
 
-fn groups(dataset: &Path, frames: LazyFrame) -> Result<Groups> {
+fn groups(dataset: &Path, rows: LazyFrame) -> Result<Groups> {
     let path = dataset.join("episodes.parquet");
     if !path.is_file() {
-        return Err(broken(&path, "the table of episodes is missing".to_string()));
+        return Err(frames::broken(&path, "the table of episodes is missing".to_string()));
     }
-    let episodes = scan(iter::once(path.clone())).map_err(Error::query(&path))?;
+    let episodes = frames::scan(iter::once(path.clone())).map_err(Error::query(&path))?;
     let listed = |column: &str, names: &[&str]| -> Result<Vec<Group>> {
-        let mut counts = count_by(frames.clone(), column, len()).map_err(Error::query(dataset))?;
+        let mut counts = count_by(rows.clone(), column, len()).map_err(Error::query(dataset))?;
         let known = names.iter().map(|name| Group {
             frames: counts.remove(&Some((*name).to_string())).unwrap_or_default(),
             name: Some((*name).to_string()),
@@ -302,6 +256,22 @@ fn groups(dataset: &Path, frames: LazyFrame) -> Result<Groups> {
         illumination: occurring("illumination")?,
         traffic: occurring("traffic")?,
     })
+}
+
+/// Conditions together, in the order of their words.
+fn coverage(manifest: &Manifest) -> Vec<Combination> {
+    let mut cells: BTreeMap<[Option<String>; 4], [u64; 2]> = BTreeMap::new();
+    for log in &manifest.logs {
+        let Conditions { town, weather, illumination, traffic } = log.conditions.clone();
+        let [episodes, frames] = cells.entry([town, weather, illumination, traffic]).or_default();
+        *episodes += log.episodes.len() as u64;
+        *frames += log.frames;
+    }
+    let cell = |(words, [episodes, frames]): ([Option<String>; 4], [u64; 2])| {
+        let [town, weather, illumination, traffic] = words;
+        Combination { town, weather, illumination, traffic, episodes, frames }
+    };
+    cells.into_iter().map(cell).collect()
 }
 
 /// What `count` gives for each word of a column; null is a word, too.
@@ -350,9 +320,4 @@ fn left_out(manifest: &Manifest) -> LeftOut {
             .collect(),
         failed_logs: manifest.failed.iter().map(|log| loss(&log.source_log, &log.error)).collect(),
     }
-}
-
-fn broken(path: &Path, what: String) -> Error {
-    let hint = Some("remove the dataset and ingest the logs again".to_string());
-    Error::Dataset { path: path.to_path_buf(), what, hint }
 }

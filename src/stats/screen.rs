@@ -3,7 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use crate::{
-    digits::grouped,
+    digits::{fixed, grouped},
     stats::summary::{Group, Groups, LeftOut, Loss, Part, Quantiles, Summary},
 };
 
@@ -223,14 +223,5 @@ fn percent(share: f64) -> Option<String> {
         share if share < 0.001 => Some("<0.1 %".to_string()),
         share if share < 1.0 && share > 0.999 => Some(">99.9 %".to_string()),
         share => Some(format!("{:.1} %", 100.0 * share)),
-    }
-}
-
-/// With so many decimals and without the sign of a rounded zero.
-fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.into(),
-        _ => text,
     }
 }

@@ -20,6 +20,7 @@ pub struct Summary {
     pub signals: Signals,
     pub skews: Skews,
     pub groups: Groups,
+    pub coverage: Vec<Combination>,
     pub left_out: LeftOut,
 }
 
@@ -175,6 +176,17 @@ pub struct Groups {
 pub struct Group {
     /// `None` where it is not known, which is listed last.
     pub name: Option<String>,
+    pub frames: u64,
+}
+
+/// Episodes under the same conditions; only combinations that occur are listed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Combination {
+    pub town: Option<String>,
+    pub weather: Option<String>,
+    pub illumination: Option<String>,
+    pub traffic: Option<String>,
+    pub episodes: u64,
     pub frames: u64,
 }
 

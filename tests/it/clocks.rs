@@ -50,6 +50,15 @@ fn again(first: Vec<Recorded>, start_ns: i64) -> Vec<Recorded> {
     first.into_iter().chain(second.into_iter().map(later)).collect()
 }
 
+/// A log whose clock begins anew in the middle: two episodes.
+#[cfg(feature = "checks")]
+pub(crate) fn with_a_jump(folder: &Path, name: &str) -> std::path::PathBuf {
+    let messages = again(short().messages(), short().start_ns - ns(30.0));
+    let log = folder.join(name);
+    fs::write(&log, mcap_bytes(&messages, &Layout::default())).unwrap();
+    log
+}
+
 #[test]
 fn an_offset_puts_a_clock_right_and_so_do_the_log_times() {
     let folder = tempfile::tempdir().unwrap();

@@ -33,7 +33,12 @@ pub(crate) struct Said {
 }
 
 pub(crate) fn ingest(arguments: &[&str]) -> Said {
-    let Output { status, stdout, stderr } = Command::new(PROGRAM).args(arguments).output().unwrap();
+    run(PROGRAM, arguments)
+}
+
+/// What a program says.
+pub(crate) fn run(program: &str, arguments: &[&str]) -> Said {
+    let Output { status, stdout, stderr } = Command::new(program).args(arguments).output().unwrap();
     Said {
         code: status.code().unwrap(),
         out: String::from_utf8(stdout).unwrap(),
@@ -65,7 +70,7 @@ pub(crate) fn frames(dataset: &Path) -> Vec<(String, Frame)> {
 }
 
 /// Every file below a folder with its bytes.
-fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub(crate) fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     fn walk(folder: &Path, root: &Path, found: &mut BTreeMap<PathBuf, Vec<u8>>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

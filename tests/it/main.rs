@@ -28,6 +28,7 @@ mod ahead;
 mod ingest;
 mod collection;
 mod compaction;
+mod card;
 mod memory;
 mod writers;
 mod clocks;
@@ -93,10 +94,19 @@ mod map_traps;
 mod maps;
 #[cfg(feature = "reports")]
 mod stats;
+#[cfg(feature = "reports")]
+mod stats_page;
+mod notebook;
 #[cfg(feature = "checks")]
 mod checks;
 #[cfg(feature = "checks")]
 mod check_faults;
+#[cfg(feature = "checks")]
+mod edit;
+#[cfg(feature = "checks")]
+mod lerobot;
+#[cfg(feature = "checks")]
+mod tables_of_frames;
 #[cfg(feature = "learning")]
 mod drive_cli;
 #[cfg(feature = "learning")]

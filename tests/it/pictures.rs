@@ -7,7 +7,8 @@ use std::{path::Path, process::Command};
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use pmp::{
     dataset::picture::{
-        self, Content, Decoded, jpeg,
+        self, Content, Decoded, jpeg, jpeg_write,
+        planes::Stored,
         rgb::{MAX_PIXELS, Rgb},
         scale::{self, Area},
     },
@@ -421,6 +422,57 @@ fn a_shrunk_decode_is_close_to_the_full_one_and_in_its_place() {
             assert!(close_db > least_db, "{name} at 1/{reduction}: {close_db} dB");
         }
     }
+}
+
+/// Luma and colour differences of a picture (JFIF), colours of 2 x 2 pixels shared.
+fn stored_of(rgb: &Rgb) -> Stored {
+    let Rgb { width, height, .. } = *rgb;
+    let weighted = |x: usize, y: usize, weights: [f64; 3]| -> f64 {
+        let pixel = &rgb.data[3 * (y * width + x)..][..3];
+        pixel.iter().zip(weights).map(|(channel, weight)| f64::from(*channel) * weight).sum()
+    };
+    let mut data = Vec::new();
+    for at in 0..width * height {
+        data.push(weighted(at % width, at / width, [0.299, 0.587, 0.114]).round() as u8);
+    }
+    for weights in [[-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]] {
+        for at in 0..width * height / 4 {
+            let (x, y) = (at % (width / 2) * 2, at / (width / 2) * 2);
+            let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+            let mean = four.map(|(x, y)| weighted(x, y, weights)).iter().sum::<f64>() / 4.0;
+            data.push((mean + 128.0).round() as u8);
+        }
+    }
+    Stored { width, height, data }
+}
+
+#[test]
+fn what_is_written_is_as_near_and_as_short_as_what_a_library_writes() {
+    let mut state = 1_u32;
+    let noise = [(); 3 * 48 * 32].map(|()| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if state >> 31 == 0 { 0 } else { 255 }
+    });
+    let noise = Rgb { width: 48, height: 32, data: noise.to_vec() };
+    // Units that are whole, cut in one way, and in both; and a picture within one block.
+    for rgb in [scene(320, 240), scene(600, 250), scene(34, 16), scene(6, 2), noise] {
+        for quality in [30, 75, 90, 100] {
+            let (width, height) = (rgb.width as u16, rgb.height as u16);
+            let mut expected = Vec::new();
+            let mut encoder = Encoder::new(&mut expected, quality);
+            encoder.set_sampling_factor(SamplingFactor::F_2_2);
+            encoder.encode(&rgb.data, width, height, ColorType::Rgb).unwrap();
+            let written = jpeg_write::write(&stored_of(&rgb), quality).unwrap();
+            let db = |file: &[u8]| psnr_db(&decode(file).unwrap().data, &rgb.data);
+            let (ours_db, theirs_db) = (db(&written), db(&expected));
+            let name = format!("{width} x {height} at {quality}");
+            assert!(ours_db > theirs_db - 0.3, "{name}: {ours_db}, the library {theirs_db} dB");
+            let most = expected.len() as f64 * 1.01 + 64.0;
+            assert!((written.len() as f64) < most, "{name}: {} bytes", written.len());
+        }
+    }
+    let wide = Stored { width: 65_536, height: 2, data: vec![0; 65_536 * 3] };
+    assert!(jpeg_write::write(&wide, 90).is_err());
 }
 
 #[test]

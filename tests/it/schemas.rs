@@ -16,7 +16,9 @@ use pmp::{
         columns::{self, SCHEMA_VERSION, VERSION_KEY},
         drive::Calibration,
         episodes::write_episodes,
-        manifest::{EpisodeRecord, FailedLog, IngestConfig, LogRecord, Manifest},
+        manifest::{
+            Change, Edit, EpisodeRecord, FailedLog, IngestConfig, LogRecord, Manifest, Origin,
+        },
         shard::ShardRecord,
         skew::{SensorSkew, Skews},
         split::Split,
@@ -223,11 +225,27 @@ fn manifest() -> Manifest {
     let third = LogRecord { episode: "ep-3".into(), mapping: integrated, ..log.clone() };
     let fourth = LogRecord { episode: "ep-4".into(), mapping: gnss, ..log.clone() };
     let failed = vec![FailedLog { source_log: "b.mcap".into(), error: "why".into() }];
-    Manifest::new(
-        IngestConfig::new(profile, 10.0).unwrap(),
-        vec![log, other, third, fourth],
-        failed,
-    )
+    let config = IngestConfig::new(profile, 10.0).unwrap();
+    let edits = edits(&config);
+    let manifest = Manifest::new(config, vec![log, other, third, fourth], failed);
+    Manifest { edit: edits.into_iter().next(), ..manifest }
+}
+
+/// Edits of every kind.
+fn edits(config: &IngestConfig) -> Vec<Edit> {
+    let origin = Origin {
+        identity: "00".into(),
+        written_by: "pmp".into(),
+        frames: 1,
+        config: config.clone(),
+        edit: None,
+    };
+    let merge = Edit { change: Change::Merge, of: vec![origin.clone()] };
+    let of = vec![Origin { edit: Some(Box::new(merge.clone())), ..origin }];
+    let drop = Change::Drop { episodes: vec!["ep-1".into()] };
+    let resplit = Change::Resplit { rule: "--by-hash".into(), moved: vec!["ep-1".into()] };
+    let made = |change| Edit { change, of: of.clone() };
+    vec![made(drop), made(resplit), merge]
 }
 
 /// The fields that a schema file lists for a JSON file: path to type.
@@ -306,6 +324,9 @@ fn json_files_have_the_fields_of_the_schema_file() {
     let logs: Vec<Value> =
         manifest.logs.iter().map(|log| serde_json::to_value(log).unwrap()).collect();
     same_fields(&logs, &listed["logs/*.json"]);
+    let edits: Vec<Value> =
+        edits(&manifest.config).iter().map(|edit| serde_json::to_value(edit).unwrap()).collect();
+    same_fields(&edits, &listed["edit.json"]);
     let mut config = manifest.config.clone();
     let one = serde_json::to_value(&config).unwrap();
     config.profile.topics.camera = Some(Names::Several(vec!["/a".into(), "/b".into()]));

@@ -34,19 +34,23 @@ use crate::evaluation::accelerating;
 const NOTHING: &str = "–";
 
 /// One log of a dataset made by hand.
-struct Drive {
-    split: Split,
-    frames: Vec<Frame>,
-    distance_m: f64,
-    conditions: Conditions,
+pub(crate) struct Drive {
+    pub(crate) split: Split,
+    pub(crate) frames: Vec<Frame>,
+    pub(crate) distance_m: f64,
+    pub(crate) conditions: Conditions,
 }
 
-fn drive(split: Split, frames: Vec<Frame>) -> Drive {
+pub(crate) fn drive(split: Split, frames: Vec<Frame>) -> Drive {
     Drive { split, frames, distance_m: 1500.0, conditions: Conditions::default() }
 }
 
 /// Write shards, episodes and manifest as an ingest does; `change` the records before.
-fn write(root: &Path, drives: &[Drive], change: impl Fn(&mut Vec<LogRecord>)) -> Manifest {
+pub(crate) fn write(
+    root: &Path,
+    drives: &[Drive],
+    change: impl Fn(&mut Vec<LogRecord>),
+) -> Manifest {
     let record = |(number, drive): (usize, &Drive)| {
         let episode = format!("ep-{number}");
         let split = drive.split.name();
@@ -125,7 +129,7 @@ fn summary(drives: &[Drive]) -> Summary {
     summarise(root.path()).unwrap()
 }
 
-fn pmp_stats(arguments: &[&str]) -> Output {
+pub(crate) fn pmp_stats(arguments: &[&str]) -> Output {
     Process::new(assert_cmd::cargo::cargo_bin!("pmp-stats")).args(arguments).output().unwrap()
 }
 

@@ -1,6 +1,8 @@
 //! `pmp-stats`: a dataset in, numbers, pictures and verdicts out.
 
 mod check;
+mod edit;
+mod export;
 #[cfg(feature = "reports")]
 mod report;
 
@@ -32,6 +34,14 @@ struct Args {
 #[derive(Subcommand)]
 enum Command {
     Check(check::Check),
+    /// Put datasets together into a new one; prints its identity
+    Merge(edit::Merge),
+    /// Make a new dataset without some episodes; prints its identity
+    Drop(edit::Drop),
+    /// Make a new dataset with other episodes to train and to judge; prints its identity
+    Resplit(edit::Resplit),
+    /// Write a dataset in the layout of other readers
+    Export(export::Export),
 }
 
 const EXAMPLES: &str = "\
@@ -39,13 +49,22 @@ Examples:
   pmp-stats data                             one screen
   pmp-stats data --json > stats.json         the same as data
   pmp-stats data --json | jq .splits.train.hours
+  pmp-stats data --html data.html            a page to look at
   pmp-stats check data                       what would hurt a training run
+  pmp-stats merge monday tuesday --out week
+  pmp-stats drop week --log tunnel.mcap --out week-2
+  pmp-stats resplit week-2 --val-town Town02 --out week-3
+  pmp-stats export week --format lerobot --out week-lerobot
 
 Exit codes: 0 done; 1 failed, for example because the folder is no whole dataset; 2 misused";
 
 fn main() -> ExitCode {
     cli::main(|| match Args::parse() {
         Args { command: Some(Command::Check(check)), .. } => check::run(&check),
+        Args { command: Some(Command::Merge(merge)), .. } => edit::run_merge(&merge),
+        Args { command: Some(Command::Drop(drop)), .. } => edit::run_drop(&drop),
+        Args { command: Some(Command::Resplit(resplit)), .. } => edit::run_resplit(&resplit),
+        Args { command: Some(Command::Export(export)), .. } => export::run(&export),
         #[cfg(feature = "reports")]
         Args { report: Some(report), .. } => report::run(&report),
         // Without a subcommand the report's dataset is required.

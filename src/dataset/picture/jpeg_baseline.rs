@@ -4,42 +4,14 @@
 //! end. So data that lacks within is noticed although the file ends as it should, which libraries
 //! that fill up what is missing do not tell.
 
+use std::sync::{Arc, LazyLock};
+
 use crate::dataset::picture::{
-    jpeg_codes::{Bits, Codes, END, Look, PADDING},
+    jpeg_codes::{Bits, Codes, END, LOOKS_A_FILL, Look, PADDING},
     jpeg_header::Header,
     jpeg_segments::{START_OF_SCAN, segments},
+    jpeg_tables::{self, COEFFICIENTS, Listed},
 };
-
-/// Coefficients of a block.
-pub const COEFFICIENTS: usize = 64;
-
-/// Where the coefficients of a block lie, in the order in which they are stored: 8 x the
-/// vertical frequency + the horizontal one (T.81, figure A.6).
-pub const ZIGZAG: [u8; COEFFICIENTS] = zigzag();
-
-const fn zigzag() -> [u8; COEFFICIENTS] {
-    let mut order = [0; COEFFICIENTS];
-    let (mut row, mut column, mut at) = (0, 0, 0);
-    while at < COEFFICIENTS {
-        order[at] = 8 * row + column;
-        // Up to the right on even diagonals, down to the left on odd ones, along the border between.
-        if (row + column) % 2 == 0 {
-            match (row, column) {
-                (_, 7) => row += 1,
-                (0, _) => column += 1,
-                _ => (row, column) = (row - 1, column + 1),
-            }
-        } else {
-            match (row, column) {
-                (7, _) => column += 1,
-                (_, 0) => row += 1,
-                _ => (row, column) = (row + 1, column - 1),
-            }
-        }
-        at += 1;
-    }
-    order
-}
 
 /// Luma, or a colour difference.
 #[derive(Clone, Debug)]
@@ -49,9 +21,12 @@ pub struct Component {
     pub down: usize,
     /// What the coefficients are to be multiplied by, in the order in which they are stored.
     pub quantiser: [u16; COEFFICIENTS],
-    dc: Codes,
-    ac: Codes,
+    dc: Arc<Codes>,
+    ac: Arc<Codes>,
 }
+
+/// Tables of codes by class, of means and of what differs from them, and by slot.
+type Tables = [[Option<Arc<Codes>>; 4]; 2];
 
 /// A file of one scan, ready to be decoded.
 #[derive(Clone, Debug)]
@@ -84,7 +59,7 @@ impl<'a> Baseline<'a> {
     /// Read the tables; `None` for other kinds of JPEG, and where the tables are not usable.
     pub fn read(jpeg: &'a [u8], header: &Header) -> Option<Baseline<'a>> {
         let mut quantisers: [Option<[u16; COEFFICIENTS]>; 4] = [None; 4];
-        let mut codes: [[Option<Codes>; 4]; 2] = Default::default();
+        let mut codes: Tables = Default::default();
         let mut restart_interval = None;
         let mut frame = None;
         for segment in segments(jpeg) {
@@ -137,6 +112,7 @@ impl<'a> Baseline<'a> {
     /// # Errors
     ///
     /// A sentence: what is wrong with the picture.
+    #[inline(always)]
     pub fn decode<B: Block>(
         &self,
         mut blocks: [B; 3],
@@ -189,7 +165,7 @@ fn read_block(
     block: &mut impl Block,
 ) -> Option<()> {
     bits.fill();
-    let size = bits.symbol(&component.dc, bits.look(&component.dc))?;
+    let size = bits.mean_size(&component.dc)?;
     if size > 11 {
         return None;
     }
@@ -197,28 +173,27 @@ fn read_block(
     *previous = previous.wrapping_add(bits.number(u32::from(size)));
     block.set(0, *previous);
     let mut at = 1;
-    while at < COEFFICIENTS {
-        // Enough for two looks, each of 26 bits at most.
+    'block: while at < COEFFICIENTS {
         bits.fill();
-        for _ in 0..2 {
+        for _ in 0..LOOKS_A_FILL {
             let look = bits.look(&component.ac);
             if look.first == 0 {
+                bits.fill();
                 at += rare(bits, component, look, at, block)?;
-            } else {
-                let [first, second] = bits.numbers(look);
-                at += usize::from(look.first);
-                block.set((at - 1) % COEFFICIENTS, first);
-                if at >= COEFFICIENTS {
-                    // What is seen behind it is of the next block.
-                    bits.skip_first(look);
-                    break;
-                }
-                at += usize::from(look.second);
-                block.set((at - 1) % COEFFICIENTS, second);
-                bits.skip_both(look);
+                continue 'block;
             }
+            at += usize::from(look.first);
+            block.set((at - 1) % COEFFICIENTS, i32::from(look.numbers[0]));
             if at >= COEFFICIENTS {
-                break;
+                // What is seen behind it is of the next block.
+                bits.skip_first(look);
+                break 'block;
+            }
+            at += usize::from(look.second);
+            block.set((at - 1) % COEFFICIENTS, i32::from(look.numbers[1]));
+            bits.skip_both(look);
+            if at >= COEFFICIENTS {
+                break 'block;
             }
         }
     }
@@ -226,7 +201,7 @@ fn read_block(
     is_whole.then_some(())
 }
 
-/// Codes that are long, or tell of 16 zeros: how far they lead; `None` for what is no code.
+/// Codes that are long, or have long numbers: how far they lead; `None` for what is no code.
 // Within its caller, whose bits would otherwise lie in memory all the time.
 #[inline(always)]
 fn rare(
@@ -289,7 +264,7 @@ impl Runs<'_> {
 }
 
 /// Where the first byte of 0xff is.
-fn until_ff(bytes: &[u8]) -> Option<usize> {
+pub fn until_ff(bytes: &[u8]) -> Option<usize> {
     // Many at once, where there is none.
     let has_ff = |some: &[u8; 32]| some.iter().fold(false, |found, byte| found | (*byte == 0xff));
     let (pieces, _) = bytes.as_chunks();
@@ -312,12 +287,30 @@ fn read_quantisers(mut body: &[u8], into: &mut [Option<[u16; COEFFICIENTS]>; 4])
     Some(())
 }
 
-fn read_codes(mut body: &[u8], into: &mut [[Option<Codes>; 4]; 2]) -> Option<()> {
+/// A table as it is listed, and made ready.
+type Known = (Listed, Arc<Codes>);
+
+/// The tables of codes that most cameras write with, made once: of means, and of what differs from
+/// them.
+static STANDARD: LazyLock<[Vec<Known>; 2]> = LazyLock::new(|| {
+    let made = |listed: &[Listed; 2], in_pairs: bool| {
+        let codes = |one: &Listed| Codes::new(&one.counts, one.symbols, in_pairs);
+        listed.iter().filter_map(|one| Some((*one, Arc::new(codes(one)?)))).collect()
+    };
+    [made(&jpeg_tables::DC, false), made(&jpeg_tables::AC, true)]
+});
+
+fn read_codes(mut body: &[u8], into: &mut Tables) -> Option<()> {
     while let [about, rest @ ..] = body {
         let (class, slot) = (usize::from(about >> 4), usize::from(about & 15));
         let (counts, rest) = rest.split_first_chunk()?;
         let len = counts.iter().map(|count| usize::from(*count)).sum();
-        let codes = Codes::new(counts, rest.get(..len)?, class == 1)?;
+        let symbols = rest.get(..len)?;
+        let is_same = |(listed, _): &&Known| listed.counts == *counts && listed.symbols == symbols;
+        let codes = match STANDARD.get(class)?.iter().find(is_same) {
+            Some((_, codes)) => codes.clone(),
+            None => Arc::new(Codes::new(counts, symbols, class == 1)?),
+        };
         *into.get_mut(class)?.get_mut(slot)? = Some(codes);
         body = &rest[len..];
     }
@@ -329,7 +322,7 @@ fn components(
     frame: &[u8],
     scan: &[u8],
     quantisers: &[Option<[u16; COEFFICIENTS]>; 4],
-    codes: &[[Option<Codes>; 4]; 2],
+    codes: &Tables,
 ) -> Option<Vec<Component>> {
     let [8, _, _, _, _, count, in_frame @ ..] = frame else { return None };
     let [in_scan_count, in_scan @ ..] = scan else { return None };

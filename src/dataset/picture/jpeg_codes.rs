@@ -4,8 +4,15 @@
 //! is what decoding a JPEG spends most of its time on. So the chain is kept short: one look into a
 //! table for two codes and the numbers behind them, free of branches that depend on the data.
 
-/// Bits that are looked at together.
+/// Bits that are looked at together. With one more, two tables would not fit the nearest 48 KB.
 const LOOK_BITS: u32 = 11;
+
+/// Bits that are looked at for the size of a mean's change; a small table, since the large ones need
+/// the room near the processor.
+const MEAN_BITS: u32 = 9;
+
+/// Looks that the bits of one [`Bits::fill`] are enough for.
+pub const LOOKS_A_FILL: usize = 4;
 
 /// Zero bytes that [`Bits`] wants behind the data, so that it can read ahead.
 pub const PADDING: usize = 16;
@@ -16,51 +23,40 @@ pub const END: usize = 128;
 /// What the next bits say: up to two coefficients.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Look {
-    /// How far the first one leads in the block: the zeros before it and itself, or [`END`]; 0
-    /// where the code is longer than the look, tells of zeros alone, or is none.
+    /// How far the first code leads in the block: the zeros before its number and the number, or
+    /// [`END`]; 0 where the look does not see all of it, or it is none.
     pub first: u8,
     /// The same for the second one; 0 where it was not seen.
     pub second: u8,
-    /// Bits of the first code, and of the number behind it.
-    first_code: u8,
-    first_number: u8,
-    /// Bits up to the second number, and of it.
-    to_second: u8,
-    second_number: u8,
-    /// Bits of both.
+    /// The numbers behind them; 0 where there is none.
+    pub numbers: [i16; 2],
+    /// Bits of all that is seen.
     bits: u8,
-    /// The symbol of the first code; of use where its code has bits.
-    symbol: u8,
+    /// Bits of the first code and its number; of the code alone where `first` is 0, and then its
+    /// symbol is the first number.
+    first_bits: u8,
 }
 
 impl Look {
-    /// What a code says alone.
-    fn one(symbol: u8, code_bits: u8) -> Look {
-        let (zeros, number_bits) = (symbol >> 4, symbol & 15);
-        let first = match (zeros, number_bits) {
-            (0, 0) => END as u8,
-            (_, 0 | 11..) => 0,
-            _ => zeros + 1,
-        };
-        let bits = code_bits + number_bits;
-        Look {
-            first,
-            first_code: code_bits,
-            first_number: number_bits,
-            bits,
-            symbol,
-            ..Look::default()
-        }
+    /// A code whose number, if any, is not seen, or not meant.
+    fn symbol(symbol: u8, code_bits: u32) -> Look {
+        Look { first_bits: code_bits as u8, numbers: [i16::from(symbol), 0], ..Look::default() }
+    }
+
+    /// A code with its number.
+    fn one(zeros: u8, number: i16, bits: u32) -> Look {
+        let (first, bits) = (zeros + 1, bits as u8);
+        Look { first, numbers: [number, 0], bits, first_bits: bits, ..Look::default() }
     }
 
     /// With what is seen behind it.
     fn and(self, next: Look) -> Look {
-        let to_second = self.bits + next.first_code;
-        if self.first_number == 0 || next.first == 0 || u32::from(to_second) > LOOK_BITS {
+        let bits = self.bits + next.bits;
+        let is_end = self.first == 0 || usize::from(self.first) == END;
+        if is_end || next.first == 0 || u32::from(bits) > LOOK_BITS {
             return self;
         }
-        let bits = self.bits + next.bits;
-        Look { second: next.first, to_second, second_number: next.first_number, bits, ..self }
+        Look { second: next.first, numbers: [self.numbers[0], next.numbers[0]], bits, ..self }
     }
 }
 
@@ -68,6 +64,8 @@ impl Look {
 #[derive(Clone, Debug)]
 pub struct Codes {
     looks: Box<[Look; 1 << LOOK_BITS]>,
+    /// Symbols of short codes, each with the bits of its code; 0 bits for others.
+    short: Box<[(u8, u8); 1 << MEAN_BITS]>,
     /// By length of the code: codes of up to this length lie below this, left-aligned in 16 bits.
     ends: [u32; 17],
     /// By length: what to add to a code for its place among the symbols.
@@ -77,13 +75,14 @@ pub struct Codes {
 
 impl Codes {
     /// A table as a `DHT` segment has it: how many codes there are of 1 ... 16 bits, and the
-    /// symbols that they stand for; `in_pairs` where a look may see two of them.
+    /// symbols that they stand for; `in_pairs` where a look may see two of them with their numbers.
     ///
     /// `None` if there are more codes than so many bits can tell apart.
     pub fn new(counts: &[u8; 16], listed: &[u8], in_pairs: bool) -> Option<Codes> {
         let mut symbols = [0; 256];
         symbols.get_mut(..listed.len())?.copy_from_slice(listed);
         let mut looks = Box::new([Look::default(); 1 << LOOK_BITS]);
+        let mut short = Box::new([(0, 0); 1 << MEAN_BITS]);
         let (mut ends, mut places) = ([0; 17], [0; 17]);
         let (mut code, mut place) = (0_u32, 0);
         for length in 1..=16 {
@@ -93,10 +92,17 @@ impl Codes {
                 if code >= 1 << length {
                     return None;
                 }
+                if let Some(rest_bits) = MEAN_BITS.checked_sub(length) {
+                    let from = (code << rest_bits) as usize;
+                    short[from..from + (1 << rest_bits)].fill((symbol, length as u8));
+                }
                 if let Some(rest_bits) = LOOK_BITS.checked_sub(length) {
                     let from = (code << rest_bits) as usize;
-                    let look = Look::one(symbol, length as u8);
-                    looks[from..from + (1 << rest_bits)].fill(look);
+                    let seen = &mut looks[from..from + (1 << rest_bits)];
+                    match in_pairs {
+                        true => fill_in(seen, symbol, length, rest_bits),
+                        false => seen.fill(Look::symbol(symbol, length)),
+                    }
                 }
                 code += 1;
                 place += 1;
@@ -108,10 +114,26 @@ impl Codes {
             let alone = looks.clone();
             for (at, look) in looks.iter_mut().enumerate() {
                 // What is not known of the bits behind the look is not asked for.
-                *look = look.and(alone[(at << look.bits.min(16)) % alone.len()]);
+                *look = look.and(alone[(at << look.bits) % alone.len()]);
             }
         }
-        Some(Codes { looks, ends, places, symbols })
+        Some(Codes { looks, short, ends, places, symbols })
+    }
+}
+
+/// What is seen where a code of so many bits stands first, by the rest of the look.
+fn fill_in(seen: &mut [Look], symbol: u8, code_bits: u32, rest_bits: u32) {
+    let (zeros, number_bits) = (symbol >> 4, u32::from(symbol & 15));
+    match (zeros, number_bits) {
+        (0, 0) => seen.fill(Look::one(END as u8 - 1, 0, code_bits)),
+        (15, 0) => seen.fill(Look::one(zeros, 0, code_bits)),
+        (_, 1..11) if number_bits <= rest_bits => {
+            for (at, same) in seen.chunks_exact_mut(1 << (rest_bits - number_bits)).enumerate() {
+                let number = number((at as u64) << (64 - number_bits), number_bits);
+                same.fill(Look::one(zeros, number as i16, code_bits + number_bits));
+            }
+        }
+        _ => seen.fill(Look::symbol(symbol, code_bits)),
     }
 }
 
@@ -160,14 +182,7 @@ impl<'d> Bits<'d> {
         codes.looks[(self.window >> (64 - LOOK_BITS)) as usize]
     }
 
-    /// The first number that a look has seen a code for, and the second, 0 where there is none.
-    #[inline(always)]
-    pub fn numbers(&self, look: Look) -> [i32; 2] {
-        let at = |from: u8, bits: u8| number(self.window << (from & 63), u32::from(bits & 15));
-        [at(look.first_code, look.first_number), at(look.to_second, look.second_number)]
-    }
-
-    /// Go on behind both.
+    /// Go on behind all that a look has seen.
     #[inline(always)]
     pub fn skip_both(&mut self, look: Look) {
         self.skip(u32::from(look.bits) & 63);
@@ -176,21 +191,33 @@ impl<'d> Bits<'d> {
     /// Go on behind the first.
     #[inline(always)]
     pub fn skip_first(&mut self, look: Look) {
-        self.skip(u32::from(look.first_code + look.first_number) & 63);
+        self.skip(u32::from(look.first_bits) & 63);
     }
 
-    /// The symbol of the next code, which a look has seen; `None` if there is no such code.
+    /// The symbol of the next code, of which a look has seen no number; `None` if there is no such
+    /// code.
     #[inline(always)]
     pub fn symbol(&mut self, codes: &Codes, look: Look) -> Option<u8> {
-        if look.first_code > 0 {
-            self.skip(u32::from(look.first_code) & 63);
-            return Some(look.symbol);
+        if look.first_bits > 0 {
+            self.skip_first(look);
+            return Some(look.numbers[0] as u8);
         }
         let next = (self.window >> 48) as u32;
         let length = (LOOK_BITS as usize + 1..=16).find(|length| next < codes.ends[*length])?;
         self.skip(length as u32);
         let place = (next >> (16 - length)) as i32 + codes.places[length];
         codes.symbols.get(place as usize).copied()
+    }
+
+    /// The size of a mean's change; `None` if there is no such code.
+    #[inline(always)]
+    pub fn mean_size(&mut self, codes: &Codes) -> Option<u8> {
+        let (size, length) = codes.short[(self.window >> (64 - MEAN_BITS)) as usize];
+        if length > 0 {
+            self.skip(u32::from(length));
+            return Some(size);
+        }
+        self.symbol(codes, self.look(codes))
     }
 
     /// The next number of `bits` bits, 0 ... 15.

@@ -18,9 +18,11 @@
 use std::{array, f32::consts::FRAC_1_SQRT_2, f64::consts::PI};
 
 use glam::{Mat4, Vec4};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::dataset::picture::{
-    jpeg_baseline::{Baseline, Block, COEFFICIENTS, Component, ZIGZAG},
+    jpeg_baseline::{Baseline, Block, Component},
+    jpeg_tables::{COEFFICIENTS, ZIGZAG},
     planes::{Plane, Planes},
 };
 
@@ -36,14 +38,30 @@ const MOST: usize = 4;
 ///
 /// A sentence: what is wrong with the picture.
 pub fn decode(jpeg: &Baseline, reduction: usize) -> Result<Planes, String> {
-    match reduction {
-        8 => decode_to::<1>(jpeg),
-        4 => decode_to::<2>(jpeg),
-        _ => decode_to::<4>(jpeg),
+    Arch::new().dispatch(Decoding { jpeg, reduction })
+}
+
+/// Decoding, to be compiled for each kind of vector unit; what it gives is the same.
+struct Decoding<'j, 'd> {
+    jpeg: &'j Baseline<'d>,
+    reduction: usize,
+}
+
+impl WithSimd for Decoding<'_, '_> {
+    type Output = Result<Planes, String>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        match self.reduction {
+            8 => decode_to::<1>(self.jpeg),
+            4 => decode_to::<2>(self.jpeg),
+            _ => decode_to::<4>(self.jpeg),
+        }
     }
 }
 
 /// Decode to `N` x `N` samples a block.
+#[inline(always)]
 fn decode_to<const N: usize>(jpeg: &Baseline) -> Result<Planes, String> {
     let (units_across, units_down) = jpeg.units();
     let luma = &jpeg.components[0];

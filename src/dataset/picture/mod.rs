@@ -12,7 +12,8 @@
 //!
 //! ```text
 //! message -> png, webp, raw (bayer, yuv), h264, jpeg of other kinds -> RGB -> scale -> jpeg
-//!         -> jpeg_baseline (jpeg_segments, jpeg_header, jpeg_codes) -> jpeg_shrink -> planes -> jpeg
+//!         -> jpeg_baseline (jpeg_segments, jpeg_header, jpeg_tables, jpeg_codes) -> jpeg_shrink
+//!            -> planes -> jpeg_write (jpeg_forward), or libjpeg-turbo
 //! ```
 
 pub mod rgb;
@@ -20,9 +21,12 @@ pub mod scale;
 pub mod planes;
 pub mod jpeg_segments;
 pub mod jpeg_header;
+pub mod jpeg_tables;
 pub mod jpeg_codes;
 pub mod jpeg_baseline;
 pub mod jpeg_shrink;
+pub mod jpeg_forward;
+pub mod jpeg_write;
 #[cfg(not(feature = "turbojpeg"))]
 pub mod jpeg_rust;
 #[cfg(feature = "turbojpeg")]

@@ -11,14 +11,8 @@ use arrow::{
     buffer::NullBuffer,
     datatypes::{Field, Schema},
 };
-use parquet::{
-    arrow::ArrowWriter,
-    basic::{Compression, ZstdLevel},
-    file::properties::WriterProperties,
-};
 
 use crate::{
-    atomic::AtomicFile,
     error::{Error, Result},
     eval::offline::{
         definitions::{CURVES, METRICS, Measure},
@@ -27,6 +21,7 @@ use crate::{
     },
     frame::{Conditions, FUTURE_STEPS, RecordedAction},
     policy::Action,
+    table_file::write_batches,
 };
 
 /// Write all rows. What a frame or a policy does not have is null.
@@ -48,20 +43,12 @@ pub fn write(path: &Path, errors: &Errors) -> Result<()> {
         let arrays = columns.into_iter().map(|(_, column)| column).collect();
         RecordBatch::try_new(schema, arrays).map_err(Error::arrow(path))
     };
-    let level = ZstdLevel::try_new(3).map_err(Error::parquet(path))?;
-    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level)).build();
     let mut batches = errors.policies.iter().map(batch).peekable();
     let schema = match batches.peek() {
         Some(Ok(first)) => first.schema(),
         _ => Arc::new(Schema::empty()),
     };
-    let file = AtomicFile::create(path)?;
-    let mut writer =
-        ArrowWriter::try_new(file, schema, Some(properties)).map_err(Error::parquet(path))?;
-    for batch in batches {
-        writer.write(&batch?).map_err(Error::parquet(path))?;
-    }
-    writer.into_inner().map_err(Error::parquet(path))?.commit()?;
+    write_batches(path, schema, batches, &[])?;
     Ok(())
 }
 

@@ -113,7 +113,8 @@ pub static ROUTE_DRIVEN: Check = Check {
     remedy: "record the navigator's route; until then trust closed-loop numbers only",
 };
 
-/// Turns of the route that tell left from right, rad; how many frames tell; how many may disagree.
+/// Turns of the route that tell left from right, rad; how many frames of a side tell; how many may
+/// disagree.
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
 const ENOUGH_TURNS: u64 = 20;
 const OTHER_SIDE_SHARE: f64 = 0.5;
@@ -123,7 +124,7 @@ pub static COMMAND_SIDE: Check = Check {
     name: "command-side",
     level: Level::Error,
     needs: Needs::Columns,
-    what: "more than half of an episode's frames that say left or right, on a route that turns by 45 degrees, turn to the other side",
+    what: "of an episode's frames on a route that turns by 45 degrees, more than half of those that say left and of those that say right turn to the other side",
     why: "CIL switches its branch by the command: left and right are swapped",
     remedy: "look at how the commands are numbered in the log",
 };
@@ -281,28 +282,35 @@ fn turn_rad(points: &[f32]) -> Option<f64> {
     Some(wrap_angle(heading(last) - heading(0)))
 }
 
+/// Both sides have to be wrong: on the way into a roundabout a route may lead left although the
+/// turn is to the right.
 fn command_sides(track: &Track) -> Option<Finding> {
-    let (mut telling, mut others) = (0, Vec::new());
+    // By side, left and right: frames that tell, and those that turn to the other one.
+    let (mut telling, mut turned) = ([0_u64; 2], [0_u64; 2]);
+    let mut others = Vec::new();
     for row in 0..track.len() {
-        let side = match track.command[row] {
-            Some(Command::Left) => 1.0,
-            Some(Command::Right) => -1.0,
+        let (side, sign) = match track.command[row] {
+            Some(Command::Left) => (0, 1.0),
+            Some(Command::Right) => (1, -1.0),
             _ => continue,
         };
         let Some(turn) = turn_rad(waypoints(track, row)).filter(|turn| turn.abs() > TURN_RAD)
         else {
             continue;
         };
-        telling += 1;
-        if turn * side < 0.0 {
+        telling[side] += 1;
+        if turn * sign < 0.0 {
+            turned[side] += 1;
             others.push((track.frame[row], turn.abs()));
         }
     }
     let hits = Hits::of(others)?;
-    let share = hits.count as f64 / telling as f64;
+    let share = hits.count as f64 / telling.iter().sum::<u64>() as f64;
     let sentence =
         format!("{} of the commands left and right are for the other side", percent(share));
-    let is_swapped = share > OTHER_SIDE_SHARE && telling >= ENOUGH_TURNS;
+    let is_swapped = telling.into_iter().zip(turned).all(|(telling, turned)| {
+        telling >= ENOUGH_TURNS && turned as f64 > OTHER_SIDE_SHARE * telling as f64
+    });
     is_swapped.then(|| COMMAND_SIDE.found(hits.of_episode(&track.episode), share, sentence))
 }
 

@@ -15,7 +15,7 @@ use parquet::{
 use crate::{
     atomic,
     dataset::{
-        manifest::{EpisodeRecord, LogRecord, Manifest},
+        manifest::{EDIT, EpisodeRecord, LogRecord, Manifest},
         shard::ShardRecord,
     },
     error::Error,
@@ -170,9 +170,11 @@ pub static ALL: [&Check; 16] = [
 /// Read the manifest; without one, the finding that says so.
 pub fn manifest(dataset: &Path) -> Result<Manifest, Finding> {
     if !Manifest::path(dataset).is_file() {
-        let what = match dataset.join("ingest.json").exists() {
-            true => "manifest.json is missing: an ingest was not finished",
-            false => "manifest.json is missing: the folder is no dataset",
+        let has = |name: &str| dataset.join(name).exists();
+        let what = match (has(EDIT), has("ingest.json")) {
+            (true, _) => "manifest.json is missing: an edit was not finished",
+            (false, true) => "manifest.json is missing: an ingest was not finished",
+            (false, false) => "manifest.json is missing: the folder is no dataset",
         };
         return Err(MANIFEST_MISSING.found(Place::dataset(), None, what));
     }
