@@ -41,7 +41,7 @@ struct Candidate<'m> {
 }
 
 /// Of each weather and illumination a moment in the densest traffic there is, from as many towns as
-/// can be; then of further episodes, evenly, up to [`LEAST`]. From the middle row group of an
+/// can be; then of further episodes, evenly, up to six. From the middle row group of an
 /// episode, the frame with most radar returns.
 ///
 /// # Errors
