@@ -452,7 +452,8 @@ pub(crate) static FAULTS: &[Fault] = &[
     fault(
         "I02",
         Drives(|drives| {
-            let shade = |x: usize, y: usize| if (x / 3 + y / 3) % 2 == 0 { 60 } else { 180 };
+            let shade =
+                |x: usize, y: usize| if (x / 3 + y / 3).is_multiple_of(2) { 60 } else { 180 };
             first(drives, 100..101)[0].image = jpeg(2 * WIDTH, HEIGHT, shade);
         }),
     ),

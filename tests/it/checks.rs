@@ -165,8 +165,9 @@ fn pictures() -> &'static [Vec<u8>] {
     static PICTURES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     PICTURES.get_or_init(|| {
         let of = |shift: usize| {
-            let shade =
-                move |x: usize, y: usize| if ((x + shift) / 4 + y / 4) % 2 == 0 { 60 } else { 180 };
+            let shade = move |x: usize, y: usize| {
+                if ((x + shift) / 4 + y / 4).is_multiple_of(2) { 60 } else { 180 }
+            };
             jpeg(WIDTH, HEIGHT, shade)
         };
         (0..8).map(of).collect()
