@@ -3,6 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
+use mimalloc::MiMalloc;
 use pmp::{
     cli::{self, Outcome},
     dataset::{
@@ -24,6 +25,9 @@ use pmp::{
     },
     remote::{location::Location, spool},
 };
+
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
 
 /// Turn MCAP driving logs into a sharded Parquet dataset
 ///

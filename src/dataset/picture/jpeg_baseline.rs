@@ -47,12 +47,35 @@ pub trait Block {
     fn set(&mut self, at: usize, value: i32);
 }
 
+/// Takes a picture block by block.
+pub trait Blocks {
+    type Block: Block;
+
+    /// What takes the next block of this component.
+    fn block(&mut self, component: usize) -> &mut Self::Block;
+
+    /// That block is whole: the one in this column and row of the component's.
+    fn done(&mut self, component: usize, column: usize, row: usize);
+}
+
 /// For who only wants to know whether a picture is whole.
 struct Unseen;
 
 impl Block for Unseen {
     #[inline(always)]
     fn set(&mut self, _at: usize, _value: i32) {}
+}
+
+impl Blocks for Unseen {
+    type Block = Unseen;
+
+    #[inline(always)]
+    fn block(&mut self, _component: usize) -> &mut Unseen {
+        self
+    }
+
+    #[inline(always)]
+    fn done(&mut self, _component: usize, _column: usize, _row: usize) {}
 }
 
 impl<'a> Baseline<'a> {
@@ -97,7 +120,7 @@ impl<'a> Baseline<'a> {
     ///
     /// A sentence: what is wrong with it.
     pub fn check(&self) -> Result<(), String> {
-        self.decode([Unseen, Unseen, Unseen], |_, _, _, _| ())
+        self.decode(&mut Unseen)
     }
 
     /// Units of the scan in a row, and rows of them.
@@ -106,18 +129,15 @@ impl<'a> Baseline<'a> {
         (self.width.div_ceil(8 * luma.across), self.height.div_ceil(8 * luma.down))
     }
 
-    /// Decode block by block, each of a component into the same of `blocks`; `done` hears of each,
-    /// with the number of its component and its column and row among the blocks of that.
+    /// Decode block by block.
     ///
     /// # Errors
     ///
     /// A sentence: what is wrong with the picture.
+    // A trait rather than closures, which cannot be made to be compiled for the caller's vector
+    // unit.
     #[inline(always)]
-    pub fn decode<B: Block>(
-        &self,
-        mut blocks: [B; 3],
-        mut done: impl FnMut(&mut B, usize, usize, usize),
-    ) -> Result<(), String> {
+    pub fn decode(&self, blocks: &mut impl Blocks) -> Result<(), String> {
         let (units_across, units_down) = self.units();
         let all = units_across * units_down;
         let mut runs = Runs { data: self.data, at: 0, bytes: Vec::new() };
@@ -129,14 +149,13 @@ impl<'a> Baseline<'a> {
             while unit < end {
                 let (column, row) = (unit % units_across, unit / units_across);
                 for (index, component) in self.components.iter().enumerate() {
-                    let block = &mut blocks[index];
                     for y in 0..component.down {
                         for x in 0..component.across {
                             let dc = &mut previous[index];
-                            read_block(&mut bits, component, dc, block)
+                            read_block(&mut bits, component, dc, blocks.block(index))
                                 .ok_or("damaged data of a JPEG")?;
                             let at = (column * component.across + x, row * component.down + y);
-                            done(block, index, at.0, at.1);
+                            blocks.done(index, at.0, at.1);
                         }
                     }
                 }

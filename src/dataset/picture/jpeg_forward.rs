@@ -56,13 +56,8 @@ impl Factors {
     /// first sample (0 ... 255) of rows that are `row_len` apart.
     #[inline(always)]
     pub fn coefficients(&self, samples: &[f32], row_len: usize) -> [i16; COEFFICIENTS] {
-        let row = |y: usize, from: usize| Vec4::from_slice(&samples[y * row_len + from..]);
-        let half = |from: usize| {
-            let rows = [row(0, from), row(1, from), row(2, from), row(3, from)];
-            let more = [row(4, from), row(5, from), row(6, from), row(7, from)];
-            sums(rows, more)
-        };
-        let ([left_low, left_high], [right_low, right_high]) = (half(0), half(4));
+        let ([left_low, left_high], [right_low, right_high]) =
+            (column_sums(samples, row_len), column_sums(&samples[4..], row_len));
         let low = sums(turn(left_low), turn(right_low));
         let high = sums(turn(left_high), turn(right_high));
         let mut all = [0.0; COEFFICIENTS];
@@ -82,6 +77,17 @@ impl Factors {
         }
         coefficients
     }
+}
+
+/// [`sums`] of the first four columns of rows that are `row_len` apart.
+#[inline(always)]
+fn column_sums(samples: &[f32], row_len: usize) -> [[Vec4; 4]; 2] {
+    let mut rows = [Vec4::ZERO; SIDE];
+    for (y, row) in rows.iter_mut().enumerate() {
+        *row = Vec4::from_slice(&samples[y * row_len..]);
+    }
+    let [a, b, c, d, e, f, g, h] = rows;
+    sums([a, b, c, d], [e, f, g, h])
 }
 
 /// Rows of four to columns.

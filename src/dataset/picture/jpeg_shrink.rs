@@ -21,7 +21,7 @@ use glam::{Mat4, Vec4};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::dataset::picture::{
-    jpeg_baseline::{Baseline, Block, Component},
+    jpeg_baseline::{Baseline, Block, Blocks, Component},
     jpeg_tables::{COEFFICIENTS, ZIGZAG},
     planes::{Plane, Planes},
 };
@@ -70,18 +70,38 @@ fn decode_to<const N: usize>(jpeg: &Baseline) -> Result<Planes, String> {
         let pixels = [luma.across / of.across, luma.down / of.down].map(|n| n * 8 / N);
         Plane { width, height, data: vec![0; width * height], pixels }
     };
-    let mut planes: Vec<Plane> = jpeg.components.iter().map(plane).collect();
     let weights = |of: &Component| Weights::new(&of.quantiser, N);
     let weights: Vec<Weights> = jpeg.components.iter().map(weights).collect();
-    let new = array::from_fn(|at| Shrunk::new(&weights[at.min(weights.len() - 1)]));
-    jpeg.decode(new, |block: &mut Shrunk, component, column, row| {
-        let plane = &mut planes[component];
-        let start = row * N * plane.width + column * N;
-        block.finish::<N>(plane.width, &mut plane.data[start..]);
-    })?;
-    let mut planes = planes.into_iter();
+    let mut shrinking = Shrinking::<N> {
+        planes: jpeg.components.iter().map(plane).collect(),
+        blocks: array::from_fn(|at| Shrunk::new(&weights[at.min(weights.len() - 1)])),
+    };
+    jpeg.decode(&mut shrinking)?;
+    let mut planes = shrinking.planes.into_iter();
     let luma = planes.next().ok_or("a JPEG without components")?;
     Ok(Planes { luma, colour: planes.next().zip(planes.next()).map(|(cb, cr)| [cb, cr]) })
+}
+
+/// The planes as far as they are made, and the block of each that is being read.
+struct Shrinking<'w, const N: usize> {
+    planes: Vec<Plane>,
+    blocks: [Shrunk<'w>; 3],
+}
+
+impl<'w, const N: usize> Blocks for Shrinking<'w, N> {
+    type Block = Shrunk<'w>;
+
+    #[inline(always)]
+    fn block(&mut self, component: usize) -> &mut Shrunk<'w> {
+        &mut self.blocks[component]
+    }
+
+    #[inline(always)]
+    fn done(&mut self, component: usize, column: usize, row: usize) {
+        let plane = &mut self.planes[component];
+        let start = row * N * plane.width + column * N;
+        self.blocks[component].finish::<N>(plane.width, &mut plane.data[start..]);
+    }
 }
 
 /// To which of the shrunk block's coefficients each one adds, and by how much, in the order in

@@ -18,6 +18,7 @@
 
 pub mod rgb;
 pub mod scale;
+pub mod transpose;
 pub mod planes;
 pub mod jpeg_segments;
 pub mod jpeg_header;

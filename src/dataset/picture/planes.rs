@@ -9,7 +9,7 @@ use fast_image_resize::{
     images::{Image, ImageRef},
 };
 
-use crate::dataset::picture::scale::Area;
+use crate::dataset::picture::{scale::Area, transpose::transposed};
 
 /// Rows of samples; the picture lies at the top left, what is beyond it at the right and lower
 /// border repeats or continues it.
@@ -68,7 +68,8 @@ impl Planes {
     }
 }
 
-/// First the rows, then the columns: of fewer rows, since columns are what takes the time.
+/// First the rows, then the columns, as rows of the plane turned: to make one row of several is
+/// far less work than to make one sample of several beside each other, and turning is little.
 fn resize_into(
     plane: &Plane,
     area: Area,
@@ -77,30 +78,30 @@ fn resize_into(
     into: &mut [u8],
 ) -> Result<(), String> {
     let [across, down] = plane.pixels.map(|pixels| pixels as f64);
-    let mut rows = vec![0; plane.width * height];
-    let all_columns = (0.0, plane.width as f64);
-    let kept_rows = (area.y / down, area.height / down);
-    let size = (plane.width, plane.height);
-    resize_part(&plane.data, size, (all_columns, kept_rows), &mut rows, (plane.width, height))?;
-    let columns = (area.x / across, area.width / across);
-    let size = (plane.width, height);
-    resize_part(&rows, size, (columns, (0.0, height as f64)), into, (width, height))
+    let rows = scale_rows(&plane.data, plane.width, (area.y / down, area.height / down), height)?;
+    let turned = transposed(&rows, plane.width);
+    let columns = scale_rows(&turned, height, (area.x / across, area.width / across), width)?;
+    into.copy_from_slice(&transposed(&columns, height));
+    Ok(())
 }
 
-/// Scale some columns and rows, each from where and how many.
-fn resize_part(
+/// Make so many rows of some of those there are: from where, and how many.
+fn scale_rows(
     source: &[u8],
-    (source_width, source_height): (usize, usize),
-    ((x, columns), (y, rows)): ((f64, f64), (f64, f64)),
-    into: &mut [u8],
-    (width, height): (usize, usize),
-) -> Result<(), String> {
-    let source = ImageRef::new(source_width as u32, source_height as u32, source, PixelType::U8)
+    row_len: usize,
+    (from, rows): (f64, f64),
+    into_rows: usize,
+) -> Result<Vec<u8>, String> {
+    let height = source.len() / row_len;
+    let source = ImageRef::new(row_len as u32, height as u32, source, PixelType::U8)
         .map_err(|error| error.to_string())?;
-    let mut target = Image::from_slice_u8(width as u32, height as u32, into, PixelType::U8)
-        .map_err(|error| error.to_string())?;
-    let options = ResizeOptions::new()
-        .resize_alg(ResizeAlg::Convolution(FilterType::Box))
-        .crop(x, y, columns, rows);
-    Resizer::new().resize(&source, &mut target, &options).map_err(|error| error.to_string())
+    let mut target = Image::new(row_len as u32, into_rows as u32, PixelType::U8);
+    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Box)).crop(
+        0.0,
+        from,
+        row_len as f64,
+        rows,
+    );
+    Resizer::new().resize(&source, &mut target, &options).map_err(|error| error.to_string())?;
+    Ok(target.into_vec())
 }
