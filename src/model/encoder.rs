@@ -9,7 +9,7 @@ use crate::{
         batch_norm::BatchNorm,
         describe,
         init::kaiming,
-        net_config::{self, PictureConfig},
+        net_config::{self, PictureConfig, Ranging},
         ops::{Conv, conv2d},
         pass::Pass,
         resnet::ResNet34,
@@ -21,7 +21,13 @@ const CAMERA_MEAN: [f32; 3] = [0.485, 0.456, 0.406];
 const CAMERA_STD: [f32; 3] = [0.229, 0.224, 0.225];
 
 /// x, y, z are divided by 50 m, relative speeds by 20 m/s.
-const RALIDAR_UNITS: [f32; 4] = [50.0, 50.0, 50.0, 20.0];
+const METRES_UNITS: [f32; 4] = [50.0, 50.0, 50.0, 20.0];
+
+/// x is divided by 10 m, y by 2 m, relative speeds by 10 m/s; nearness has no unit.
+const NEARNESS_UNITS: [f32; 4] = [10.0, 2.0, 1.0, 10.0];
+
+/// Depth at which nearness is 1/2.
+const HALF_NEAR_M: f64 = 5.0;
 
 /// Kernel sides and strides of CIL's eight convolutions, none of them padded (Codevilla 2018, its
 /// authors' `imitation_learning_network.py`).
@@ -32,13 +38,56 @@ const CIL: [(usize, usize); 8] = [(5, 2), (3, 1), (3, 2), (3, 1), (3, 2), (3, 1)
 pub enum Sensor {
     /// `[B, H, W, 3]`, RGB in 0 ... 1.
     Camera,
-    /// `[B, H, W, 4]`: x, y, z in metres, relative speed in m/s.
-    Ralidar,
+    /// `[B, H, W, 4]`: x, y, z in metres (camera, optical), relative speed in m/s, which is looked
+    /// at with `radar` alone.
+    Ralidar { ranging: Ranging, radar: bool },
+}
+
+impl Sensor {
+    /// Mean and unit of each number of a pixel that is looked at.
+    fn scale(self) -> (&'static [f32], &'static [f32]) {
+        const ZERO: [f32; 4] = [0.0; 4];
+        let (ranging, radar) = match self {
+            Sensor::Camera => return (&CAMERA_MEAN, &CAMERA_STD),
+            Sensor::Ralidar { ranging, radar } => (ranging, radar),
+        };
+        let units = match ranging {
+            Ranging::Metres => &METRES_UNITS,
+            Ranging::Nearness => &NEARNESS_UNITS,
+        };
+        let channels = if radar { 4 } else { 3 };
+        (&ZERO[..channels], &units[..channels])
+    }
+
+    /// The numbers that are looked at.
+    fn looked_at(self, picture: &Tensor) -> Result<Tensor> {
+        let (ranging, radar) = match self {
+            Sensor::Camera => return Ok(picture.clone()),
+            // As it is: to cut it up and join it again would be a copy.
+            Sensor::Ralidar { ranging: Ranging::Metres, radar: true } => return Ok(picture.clone()),
+            Sensor::Ralidar { ranging, radar } => (ranging, radar),
+        };
+        let [across_down, depth_m, speed_mps] =
+            [(0, 2), (2, 1), (3, 1)].map(|(from, len)| picture.narrow(3, from, len));
+        let (across_down, depth_m) = (across_down?, depth_m?);
+        let ahead = match ranging {
+            Ranging::Metres => depth_m,
+            Ranging::Nearness => {
+                let nearness = ((&depth_m + HALF_NEAR_M)?.recip()? * HALF_NEAR_M)?;
+                depth_m.gt(0.0)?.where_cond(&nearness, &depth_m.zeros_like()?)?
+            }
+        };
+        match radar {
+            true => Ok(Tensor::cat(&[across_down, ahead, speed_mps?], 3)?),
+            false => Ok(Tensor::cat(&[across_down, ahead], 3)?),
+        }
+    }
 }
 
 /// The convolutional half of a picture's branch.
 #[derive(Clone, Debug)]
 pub struct Encoder {
+    sensor: Sensor,
     /// `[C]`: the input is scaled to (x - mean) / unit.
     mean: Tensor,
     unit: Tensor,
@@ -75,10 +124,7 @@ impl Encoder {
     /// [`Error::Tensor`](crate::error::Error::Tensor) if the builder lacks a parameter or has it
     /// in another shape.
     pub fn new(sensor: Sensor, cfg: &PictureConfig, vb: VarBuilder) -> Result<Self> {
-        let (mean, unit): (&[f32], &[f32]) = match sensor {
-            Sensor::Camera => (&CAMERA_MEAN, &CAMERA_STD),
-            Sensor::Ralidar => (&[0.0; 4], &RALIDAR_UNITS),
-        };
+        let (mean, unit) = sensor.scale();
         let constant = |values: &[f32]| Tensor::new(values, vb.device())?.to_dtype(vb.dtype());
         let (mean, unit) = (constant(mean)?, constant(unit)?);
         let (name, size) = (vb.prefix(), [cfg.height, cfg.width]);
@@ -97,7 +143,7 @@ impl Encoder {
                 stack(mean.elem_count(), cfg, &kernels, &vb)?
             }
         };
-        Ok(Self { mean, unit, layers, name, size, width })
+        Ok(Self { sensor, mean, unit, layers, name, size, width })
     }
 
     /// `[B, H, W, C]` and `[B, 1]` to `[B, width]`, all 0 or more, of the picture's type; computed
@@ -108,7 +154,8 @@ impl Encoder {
     ///
     /// [`Error::Tensor`](crate::error::Error::Tensor) if shapes disagree.
     pub fn forward(&self, picture: &Tensor, present: &Tensor, pass: &Pass) -> Result<Tensor> {
-        let scaled = picture.broadcast_sub(&self.mean)?.broadcast_div(&self.unit)?;
+        let scaled =
+            self.sensor.looked_at(picture)?.broadcast_sub(&self.mean)?.broadcast_div(&self.unit)?;
         let x = match all_present(present)? {
             true => scaled,
             false => {

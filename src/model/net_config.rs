@@ -47,6 +47,8 @@ pub enum Preset {
 pub enum Part {
     Camera,
     Ralidar,
+    /// The speeds that radar measured; where lidar met something stays.
+    Radar,
     Route,
     Velocity,
     /// Features count alike instead of by their attention.
@@ -93,9 +95,11 @@ pub enum Encoder {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PmpConfig {
-    /// What is left out: camera, ralidar, route, velocity, attention.
+    /// What is left out: camera, ralidar, radar, route, velocity, attention.
     pub disable: Vec<Part>,
     pub picture: PictureConfig,
+    #[serde(default)]
+    pub ranging: Ranging,
     /// Width of what each branch says (paper: 2048).
     pub feature: usize,
     /// Widths between input and feature, or between feature and output.
@@ -115,6 +119,19 @@ pub struct PmpConfig {
     pub speed_head: bool,
     /// Share of numbers dropped in the heads while learning.
     pub dropout: f64,
+}
+
+/// How the places that lidar met are told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ranging {
+    /// Coordinates in units of 50 m, the paper read literally. No return is 0, and what is very
+    /// near is almost 0.
+    #[default]
+    Metres,
+    /// Nearness in place of the depth: 0 without a return, 1 at the lens, 1/2 at 5 m; right and
+    /// down in units in which a car is large.
+    Nearness,
 }
 
 /// Which numbers of a motion share a weight.
@@ -294,6 +311,7 @@ impl PmpConfig {
         let tiny = Self {
             disable: vec![],
             picture: PictureConfig::small(preset),
+            ranging: Ranging::default(),
             feature: 128,
             route_hidden: vec![128],
             velocity_hidden: vec![64],

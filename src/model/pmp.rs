@@ -70,6 +70,7 @@ impl Pmp {
             let eye = || Eye::new(sensor, &cfg.picture, f, vb.pp(name));
             cfg.has(part).then(eye).transpose()
         };
+        let ralidar = Sensor::Ralidar { ranging: cfg.ranging, radar: cfg.has(Part::Radar) };
         let dense = |from: usize, hidden: &[usize], to: usize, last: NonLinearity, name: &str| {
             Dense::new(&[&[from], hidden, &[to]].concat(), last, vb.pp(name))
         };
@@ -90,7 +91,7 @@ impl Pmp {
         let speed = || head(unspoken * f, &cfg.action_hidden, 1, "speed");
         Ok(Self {
             camera: eye(Part::Camera, Sensor::Camera, "camera")?,
-            ralidar: eye(Part::Ralidar, Sensor::Ralidar, "ralidar")?,
+            ralidar: eye(Part::Ralidar, ralidar, "ralidar")?,
             velocity: branch(Part::Velocity, 2, &cfg.velocity_hidden, "velocity")?,
             route: branch(Part::Route, 2 * ROUTE_POINTS, &cfg.route_hidden, "route")?,
             attention: cfg.has(Part::Attention).then(attention).transpose()?,

@@ -14,7 +14,7 @@ use pmp::{
         init::Weights,
         loss::{LossSums, motion_nll},
         mixture::Mixture,
-        net_config::{Model, NetConfig, Part, PmpConfig, Preset},
+        net_config::{Model, NetConfig, Part, PmpConfig, Preset, Ranging},
         network::Network,
         ops::gradients::backward,
         output::Output,
@@ -141,6 +141,50 @@ fn network_does_without_each_part_that_is_disabled() {
     let mut int = NetConfig::preset(Model::Int, Preset::Nano);
     let error = int.disable(&[Part::Camera]).unwrap_err().to_string();
     assert_eq!(error, "disable: only the networks `pmp` and `blind` can do without a part");
+}
+
+/// A batch's lidar and radar `[B, H, W, 4]` with each pixel through `change`.
+fn with_ralidar(inputs: &Inputs, change: impl Fn([f32; 4]) -> [f32; 4]) -> Inputs {
+    let ralidar = inputs.ralidar.as_ref().unwrap();
+    let pixels = numbers(ralidar).as_chunks().0.iter().copied().flat_map(change).collect();
+    let changed = Tensor::from_vec::<_, f32>(pixels, ralidar.shape(), &Cpu).unwrap();
+    Inputs { ralidar: Some(changed), ..inputs.clone() }
+}
+
+#[test]
+fn nearness_is_the_same_network_on_other_numbers() {
+    let fresh = |ranging| fresh(&NetConfig::Pmp(PmpConfig { ranging, ..small_net() })).1;
+    let (metres, nearness) = (fresh(Ranging::Metres), fresh(Ranging::Nearness));
+    let sparse = batch(&NetConfig::Pmp(small_net()), 2).inputs;
+    let sparse = with_ralidar(&sparse, |[x, y, z, v]| match z > 0.5 {
+        true => [x, y, 40.0 * z, v],
+        false => [0.0; 4],
+    });
+    // What nearness makes of a pixel, in the units of the other: a return at 5 m is at a half.
+    let told = with_ralidar(&sparse, |[x, y, z, v]| {
+        let near = if z > 0.0 { 1.0 / (1.0 + z / 5.0) } else { 0.0 };
+        [x * 50.0 / 10.0, y * 50.0 / 2.0, near * 50.0, v * 20.0 / 10.0]
+    });
+    let action = |net: &Network, inputs: &Inputs| numbers(&said(net, inputs).action);
+    let pairs = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+    assert!(pairs(&action(&nearness, &sparse), &action(&metres, &told)));
+    assert!(!pairs(&action(&nearness, &sparse), &action(&metres, &sparse)));
+}
+
+#[test]
+fn without_radar_its_speeds_tell_nothing_and_lidar_still_does() {
+    for ranging in [Ranging::Metres, Ranging::Nearness] {
+        let net = PmpConfig { ranging, disable: vec![Part::Radar], ..small_net() };
+        let (weights, net) = fresh(&NetConfig::Pmp(net));
+        let inputs = batch(&NetConfig::Pmp(small_net()), 2).inputs;
+        let action = |inputs: &Inputs| numbers(&said(&net, inputs).action);
+        let faster = with_ralidar(&inputs, |[x, y, z, v]| [x, y, z, v + 3.0]);
+        let further = with_ralidar(&inputs, |[x, y, z, v]| [x, y, z + 3.0, v]);
+        assert_eq!(action(&inputs), action(&faster));
+        assert_ne!(action(&inputs), action(&further));
+        let (_, first) = weights.iter().find(|(name, _)| *name == "ralidar.conv0.weight").unwrap();
+        assert_eq!(first.dims()[1], 3);
+    }
 }
 
 #[test]
