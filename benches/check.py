@@ -7,7 +7,6 @@ same shards several times under other names: its verdict has findings, its readi
 import argparse
 import copy
 import json
-import os
 import pathlib
 import resource
 import shutil
@@ -62,8 +61,7 @@ def main():
     parser.add_argument("--data", type=pathlib.Path, required=True)
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--lerobot", type=pathlib.Path)
-    parser.add_argument("--tools", type=pathlib.Path)
+    parser.add_argument("--doctor", type=pathlib.Path, help="lerobot-doctor")
     options = parser.parse_args()
 
     print("| frames | reads | wall, ms (least) | CPU, ms | CPU, us a frame |\n|---:|---|---:|---:|---:|")
@@ -74,14 +72,14 @@ def main():
             command = [options.command, "check", str(folder), "--sample", sample]
             wall, cpu = measure(command, options.rounds)
             print(f"| {count} | {reads} | {wall:.0f} | {cpu:.0f} | {1e3 * cpu / count:.2f} |", flush=True)
-    if options.lerobot:
-        for name, arguments in [("lecop", []), ("lerobot-doctor", [])]:
-            tool = options.tools / name
-            if not os.access(tool, os.X_OK):
-                print(f"{name}: not installed")
-                continue
-            wall, cpu = measure([str(tool), str(options.lerobot), *arguments], options.rounds)
-            print(f"| {name} | {options.lerobot.name} | {wall:.0f} | {cpu:.0f} | |")
+    if options.doctor:
+        exported = options.folder / f"check-{FRAMES[0]}-lerobot"
+        shutil.rmtree(exported, ignore_errors=True)
+        export = ["export", str(options.folder / f"check-{FRAMES[0]}"), "--format", "lerobot", "--out", str(exported)]
+        subprocess.run([options.command, *export], stdout=subprocess.DEVNULL, check=True)
+        count = json.loads((exported / "meta" / "info.json").read_text())["total_frames"]
+        wall, cpu = measure([str(options.doctor), str(exported)], options.rounds)
+        print(f"| {count} | lerobot-doctor, the same frames | {wall:.0f} | {cpu:.0f} | {1e3 * cpu / count:.2f} |")
 
 
 main()

@@ -5,16 +5,14 @@
 #
 # DATASET is one that pmp-ingest made; without it six drives are recorded and ingested first
 # (minutes). Parts of it and repetitions of it are datasets of symbolic links under target/bench/.
-# Beside it, where they are installed in target/bench/venv: lecop and lerobot-doctor (PyPI), on
-# --lerobot DIR, the same frames as a LeRobot dataset (pmp-stats export --format lerobot).
+# Beside it lerobot-doctor (PyPI) on the smallest of them, exported (pmp-stats export).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-data='' rounds=7 lerobot=''
+data='' rounds=7
 while [ $# -gt 0 ]; do
     case $1 in
     --data) data=${2:?--data needs a folder} && shift 2 ;;
-    --lerobot) lerobot=${2:?--lerobot needs a folder} && shift 2 ;;
     --rounds) rounds=${2:?--rounds needs a number} && shift 2 ;;
     -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0" && exit 0 ;;
     *) echo "error: unknown option $1, see --help" >&2 && exit 2 ;;
@@ -33,6 +31,10 @@ if [ -z "$data" ]; then
         "$bin/pmp-ingest" --out $data $bench/check-logs
     fi
 fi
-others=()
-[ -z "$lerobot" ] || others=(--lerobot "$lerobot" --tools $bench/venv/bin)
-python3 benches/check.py --command "$bin/pmp-stats" --data "$data" --rounds "$rounds" --folder $bench "${others[@]}"
+venv=$bench/check-venv
+if [ ! -x $venv/bin/lerobot-doctor ]; then
+    python3 -m venv $venv
+    $venv/bin/pip install --quiet lerobot-doctor==0.2.0
+fi
+python3 benches/check.py --command "$bin/pmp-stats" --data "$data" --rounds "$rounds" --folder $bench \
+    --doctor $venv/bin/lerobot-doctor

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Everything that has to hold before a change lands: format, lints, documentation, tests, the notebook.
+# Everything that has to hold before a change lands: format, lints, documentation, tests, the notebook,
+# and that the experiment runs from its first step to its last.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -29,3 +30,6 @@ if "$PMP_PYTHON" -c "import ipykernel, matplotlib, nbclient, polars" 2>/dev/null
 else
     echo "check: skipped the notebook: $PMP_PYTHON has not all of scripts/analysis.requirements.txt" >&2
 fi
+
+rm -rf "$target/experiment"
+PMP_BIN=$target/debug scripts/experiment.sh --quick --out "$target/experiment"

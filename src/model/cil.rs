@@ -21,7 +21,7 @@ use crate::{
         dense::Dense,
         describe::Layer,
         encoder::{Encoder, Sensor},
-        net_config::CilConfig,
+        net_config::{ActionRange, CilConfig},
         output::{self, Output, VELOCITY_UNIT_MPS},
         pass::Pass,
     },
@@ -37,6 +37,7 @@ pub struct Cil {
     /// In the order of [`Command::ALL`].
     branches: Vec<Dense>,
     speed: Dense,
+    action_range: ActionRange,
     image_dropout: f64,
 }
 
@@ -71,6 +72,7 @@ impl Cil {
             joint: layers(image + velocity, &[cfg.joint], relu, "joint")?,
             branches: Command::ALL.iter().map(branch).collect::<Result<_>>()?,
             speed: head(image, 1, "speed")?,
+            action_range: cfg.action,
             image_dropout: cfg.image_dropout,
         })
     }
@@ -110,7 +112,7 @@ impl Cil {
         }
         let action = action.ok_or_else(|| candle_core::Error::msg("no command"))?;
         Ok(Output {
-            action: output::action(&action)?,
+            action: output::action(&action, self.action_range, pass)?,
             attention: None,
             motion: None,
             speed: Some(self.speed.forward(&image, pass)?),

@@ -20,7 +20,7 @@ use crate::{
         dense::Dense,
         describe::Layer,
         encoder::{Encoder, Sensor},
-        net_config::IntConfig,
+        net_config::{ActionRange, IntConfig},
         output::{self, Output},
         pass::Pass,
     },
@@ -34,6 +34,7 @@ pub struct Int {
     velocity: Dense,
     route: Dense,
     joint: Dense,
+    action_range: ActionRange,
     dropout: f64,
 }
 
@@ -60,6 +61,7 @@ impl Int {
             velocity: layers(2, &cfg.velocity_hidden, relu, "velocity")?,
             route: layers(2 * ROUTE_POINTS, &cfg.route_hidden, relu, "route")?,
             joint: layers(joint, &action, linear, "action")?.with_dropout(cfg.dropout),
+            action_range: cfg.action,
             dropout: cfg.dropout,
         })
     }
@@ -84,7 +86,7 @@ impl Int {
         let route = self.route.forward(&output::scaled_route(inputs)?, pass)?.relu()?;
         let joint = Tensor::cat(&[&image, &velocity, &route], 1)?;
         let joint = pass.dropout(&joint, self.dropout, "joint")?;
-        let action = output::action(&self.joint.forward(&joint, pass)?)?;
+        let action = output::action(&self.joint.forward(&joint, pass)?, self.action_range, pass)?;
         Ok(Output { action, attention: None, motion: None, speed: None })
     }
 }

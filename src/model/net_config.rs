@@ -112,6 +112,8 @@ pub struct PmpConfig {
     /// whether to go or to brake.
     pub modes: usize,
     pub mixture: MixtureKind,
+    #[serde(default)]
+    pub action: ActionRange,
     /// Planned speeds are added to the speed of now.
     pub residual_speed: bool,
     /// Whether the speed of now is also told from the pictures and the route alone, against
@@ -132,6 +134,18 @@ pub enum Ranging {
     /// Nearness in place of the depth: 0 without a return, 1 at the lens, 1/2 at 5 m; right and
     /// down in units in which a car is large.
     Nearness,
+}
+
+/// How any numbers become an action in its range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ActionRange {
+    /// Steering by tanh, pedals by the logistic function. Where most brakes are 0, that function
+    /// is soon so flat there that nothing is learnt from the others.
+    #[default]
+    Squashed,
+    /// As they are while learning, cut to the range when they are used (Codevilla 2018).
+    Cut,
 }
 
 /// Which numbers of a motion share a weight.
@@ -157,6 +171,8 @@ pub struct CilConfig {
     pub joint: usize,
     /// Widths before the outputs of each of the four commands and of the speed head.
     pub branch_hidden: Vec<usize>,
+    #[serde(default)]
+    pub action: ActionRange,
     /// Shares of numbers dropped while learning: after the picture, and in the branches.
     pub image_dropout: f64,
     pub branch_dropout: f64,
@@ -174,6 +190,8 @@ pub struct IntConfig {
     pub velocity_hidden: Vec<usize>,
     /// Widths before the action.
     pub joint_hidden: Vec<usize>,
+    #[serde(default)]
+    pub action: ActionRange,
     /// Share of numbers dropped before each layer of the joint part while learning.
     pub dropout: f64,
 }
@@ -320,6 +338,7 @@ impl PmpConfig {
             motion_hidden: vec![256],
             modes: 3,
             mixture: MixtureKind::Manoeuvre,
+            action: ActionRange::default(),
             residual_speed: false,
             speed_head: false,
             dropout: 0.0,
@@ -378,6 +397,7 @@ impl CilConfig {
             velocity_hidden: vec![64],
             joint: feature,
             branch_hidden: vec![feature],
+            action: ActionRange::default(),
             image_dropout: 0.0,
             branch_dropout: 0.0,
         };
@@ -397,6 +417,7 @@ impl CilConfig {
                 velocity_hidden: vec![128, 128],
                 joint: 512,
                 branch_hidden: vec![256, 256],
+                action: ActionRange::default(),
                 image_dropout: 0.3,
                 branch_dropout: 0.5,
             },
@@ -426,6 +447,7 @@ impl IntConfig {
                 route_hidden: vec![feature, feature],
                 velocity_hidden: vec![64],
                 joint_hidden: vec![feature],
+                action: ActionRange::default(),
                 dropout: 0.0,
             }
         };
@@ -439,6 +461,7 @@ impl IntConfig {
                 route_hidden: vec![512, 1024, 2048],
                 velocity_hidden: vec![64],
                 joint_hidden: vec![2048],
+                action: ActionRange::default(),
                 dropout: 0.3,
             },
         }

@@ -6,7 +6,7 @@ use candle_nn::ops::sigmoid;
 use crate::{
     dataset::batch::Inputs,
     error::{Error, Result},
-    model::mixture::Mixture,
+    model::{mixture::Mixture, net_config::ActionRange, pass::Pass},
 };
 
 /// Velocity inputs are divided by this: the 43 km/h of TCP and CILRS.
@@ -27,13 +27,18 @@ pub struct Output {
     pub speed: Option<Tensor>,
 }
 
-/// `[B, 3]` of any numbers to an action in range.
+/// `[B, 3]` of any numbers to an action; in its range, but for [`ActionRange::Cut`] while learning.
 ///
 /// # Errors
 ///
 /// [`Error::Tensor`] if there are not three.
-pub fn action(raw: &Tensor) -> Result<Tensor> {
-    let (steer, pedals) = (raw.narrow(1, 0, 1)?.tanh()?, sigmoid(&raw.narrow(1, 1, 2)?)?);
+pub fn action(raw: &Tensor, range: ActionRange, pass: &Pass) -> Result<Tensor> {
+    let (steer, pedals) = (raw.narrow(1, 0, 1)?, raw.narrow(1, 1, 2)?);
+    let (steer, pedals) = match range {
+        ActionRange::Squashed => (steer.tanh()?, sigmoid(&pedals)?),
+        ActionRange::Cut if pass.learns() => return Ok(raw.clone()),
+        ActionRange::Cut => (steer.clamp(-1f32, 1f32)?, pedals.clamp(0f32, 1f32)?),
+    };
     Ok(Tensor::cat(&[steer, pedals], 1)?)
 }
 

@@ -26,7 +26,7 @@ use crate::{
         describe::Layer,
         encoder::{Encoder, Sensor},
         mixture::Mixture,
-        net_config::{MixtureKind, Part, PictureConfig, PmpConfig},
+        net_config::{ActionRange, MixtureKind, Part, PictureConfig, PmpConfig},
         output::{self, Output},
         pass::Pass,
     },
@@ -47,6 +47,7 @@ pub struct Pmp {
     speed: Option<Dense>,
     modes: usize,
     mixture: MixtureKind,
+    action_range: ActionRange,
     residual_speed: bool,
 }
 
@@ -99,6 +100,7 @@ impl Pmp {
             gmm: head(branches * f, &cfg.motion_hidden, numbers, "gmm")?,
             speed: (cfg.speed_head && unspoken > 0).then(speed).transpose()?,
             modes: cfg.modes,
+            action_range: cfg.action,
             mixture: cfg.mixture,
             residual_speed: cfg.residual_speed,
         })
@@ -172,7 +174,7 @@ impl Pmp {
         let motion = Mixture::new(&self.gmm.forward(&joint, pass)?, self.mixture, self.modes)?;
         let speed = |head: &Dense| head.forward(&Tensor::cat(&unspoken, 1)?, pass);
         Ok(Output {
-            action: output::action(&self.action.forward(&fused, pass)?)?,
+            action: output::action(&self.action.forward(&fused, pass)?, self.action_range, pass)?,
             attention: Some(attention),
             motion: Some(match self.residual_speed {
                 true => motion.from_speed_now(&output::speed_mps(inputs)?)?,

@@ -14,10 +14,10 @@ use pmp::{
         init::Weights,
         loss::{LossSums, motion_nll},
         mixture::Mixture,
-        net_config::{Model, NetConfig, Part, PmpConfig, Preset, Ranging},
+        net_config::{ActionRange, Model, NetConfig, Part, PmpConfig, Preset, Ranging},
         network::Network,
         ops::gradients::backward,
-        output::Output,
+        output::{self, Output},
         pass::Pass,
         pretrained,
     },
@@ -185,6 +185,19 @@ fn without_radar_its_speeds_tell_nothing_and_lidar_still_does() {
         let (_, first) = weights.iter().find(|(name, _)| *name == "ralidar.conv0.weight").unwrap();
         assert_eq!(first.dims()[1], 3);
     }
+}
+
+#[test]
+fn actions_are_in_their_range_when_used_and_free_to_return_to_it_while_learning() {
+    let raw = Tensor::new(&[[-1.5f32, -0.2, 0.3], [0.4, 1.7, 0.0]], &Cpu).unwrap();
+    let said = |range, pass: &Pass| output::action(&raw, range, pass).unwrap();
+    let learn = Pass::Learn { seed: 0, step: 0, part: 0, activations: None };
+    assert_eq!(numbers(&said(ActionRange::Cut, &Pass::Judge)), [-1.0, 0.0, 0.3, 0.4, 1.0, 0.0]);
+    assert_eq!(numbers(&said(ActionRange::Cut, &learn)), numbers(&raw));
+    let squashed = numbers(&said(ActionRange::Squashed, &learn));
+    assert_eq!(squashed, numbers(&said(ActionRange::Squashed, &Pass::Judge)));
+    assert_eq!(squashed[0], (-1.5f32).tanh());
+    assert!((squashed[5] - 0.5).abs() < 1e-6);
 }
 
 #[test]

@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn every_byte_changes_row_for_column() {
         for (rows, row_len) in [(1, 1), (8, 8), (16, 24), (3, 40), (17, 5), (250, 643)] {
-            let bytes: Vec<u8> = (0..rows * row_len).map(|at| (at * 7919 >> 4) as u8).collect();
+            let bytes: Vec<u8> = (0..rows * row_len).map(|at| (at * 7919 / 16) as u8).collect();
             let columns = transposed(&bytes, row_len);
             for (row, column) in
                 (0..rows).flat_map(|row| (0..row_len).map(move |column| (row, column)))
