@@ -140,8 +140,8 @@ pub enum Ranging {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ActionRange {
-    /// Steering by tanh, pedals by the logistic function. Where most brakes are 0, that function
-    /// is soon so flat there that nothing is learnt from the others.
+    /// Steering by tanh, pedals by the logistic function, which is flat near 0, where most brakes
+    /// are.
     #[default]
     Squashed,
     /// As they are while learning, cut to the range when they are used (Codevilla 2018).
